@@ -1,0 +1,1 @@
+"""kd-trees, one an object: `build_tree(vertices, builder="sah" | "median")`."""

@@ -1,0 +1,164 @@
+"""The checked scene: plain frozen data between the scene text and everything that renders it.
+
+Axes are left-handed: x to the right, y up, +z into the picture. All arrays are float64 in scene units and are
+never written to after construction. A `Scene` holds no device data and imports nothing of the renderer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A pinhole eye and the rectangle it looks through.
+
+    eye : (3,) float64, scene units
+    corners : (4, 3) float64, vectors from the eye to the image corners UL, UR, LL, LR; bilinear in between
+    width, height : pixels
+
+    The ray of pixel (column i, row j), row 0 at the top, goes through s = (i + 0.5) / width, t = (j + 0.5) / height:
+    direction = (1-s)(1-t) UL + s(1-t) UR + (1-s)t LL + st LR, then normalised.
+    """
+
+    eye: FloatArray
+    corners: FloatArray
+    width: int
+    height: int
+
+    @classmethod
+    def from_view(
+        cls, eye: FloatArray, view: FloatArray, up: FloatArray, fov_deg: float, width: int, height: int
+    ) -> Camera:
+        """The camera of the lines E, V, F, R: `fov_deg` is the full horizontal field of view.
+
+        Raises ValueError where `view` is zero or parallel to `up`.
+        """
+        forward = np.asarray(view, np.float64)
+        length = np.linalg.norm(forward)
+        right = np.cross(np.asarray(up, np.float64), forward)
+        right_length = np.linalg.norm(right)
+        if not length > 0.0 or not right_length > 1e-12 * length * np.linalg.norm(up):
+            raise ValueError("the view direction is zero or parallel to the up vector")
+        forward = forward / length
+        right = right / right_length
+        true_up = np.cross(forward, right)
+        half_x = np.tan(np.radians(fov_deg) / 2.0)
+        half_y = half_x * height / width
+        corners = np.array([forward + sx * half_x * right + sy * half_y * true_up
+                            for sy in (1.0, -1.0) for sx in (-1.0, 1.0)])  # fmt: skip
+        return cls(np.asarray(eye, np.float64), corners, width, height)
+
+    def with_size(self, width: int, height: int) -> Camera:
+        """The same view at another size: the horizontal extent and the pixels' shape stay, the vertical extent follows."""
+        scale = (height / width) / (self.height / self.width)
+        top, bottom = self.corners[:2], self.corners[2:]
+        middle, half = (top + bottom) / 2.0, (top - bottom) / 2.0 * scale
+        return replace(self, corners=np.concatenate([middle + half, middle - half]), width=width, height=height)
+
+    def directions(self) -> FloatArray:
+        """Unit ray directions, (height, width, 3) float64."""
+        s = ((np.arange(self.width) + 0.5) / self.width)[None, :, None]
+        t = ((np.arange(self.height) + 0.5) / self.height)[:, None, None]
+        ul, ur, ll, lr = self.corners
+        d = (1 - s) * (1 - t) * ul + s * (1 - t) * ur + (1 - s) * t * ll + s * t * lr
+        return d / np.linalg.norm(d, axis=-1, keepdims=True)
+
+
+@dataclass(frozen=True)
+class Material:
+    """The homework's material. `line` is where the scene text defines it (0: not from a text)."""
+
+    color: tuple[float, float, float]
+    ambient: float
+    diffuse: float
+    specular: float
+    exponent: float
+    reflect: float = 0.0
+    refract: float = 0.0
+    ior: float = 1.0
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class PointLight:
+    """A point that shines in all directions without fall-off. `color` defaults to white."""
+
+    position: tuple[float, float, float]
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    line: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class MeshObject:
+    """Triangles that share one kd-tree.
+
+    vertices : (n, 3, 3) float64, scene units; triangle, corner, axis. The numbers as given, never rounded.
+    normals : (n, 3) float64, unit shading normal of each face (two-sided: the side is chosen at the hit);
+        zero for a triangle of exactly zero area, which is never hit
+    vertex_normals : (n, 3, 3) float64 unit normals a corner, or None where no triangle of the object is smooth
+    material_ids : (n,) int32 into Scene.materials
+    first_prim : primitive id of the object's triangle 0; ids run through the scene in the order of its text
+    name : for people, such as "object 2"
+    line : the line that calls for smooth normals (0: none)
+    """
+
+    vertices: FloatArray
+    normals: FloatArray
+    material_ids: IntArray
+    first_prim: int
+    vertex_normals: FloatArray | None = None
+    name: str = "object"
+    line: int = 0
+
+    def __len__(self) -> int:
+        return len(self.vertices)
+
+
+@dataclass(frozen=True, eq=False)
+class Spheres:
+    """All spheres of a scene: centers (k, 3) float64, radii (k,) float64 > 0, material_ids (k,) int32.
+
+    Sphere k has the primitive id (number of triangles of the scene) + k. `line`: the first S line (0: none).
+    """
+
+    centers: FloatArray = field(default_factory=lambda: np.zeros((0, 3)))
+    radii: FloatArray = field(default_factory=lambda: np.zeros(0))
+    material_ids: IntArray = field(default_factory=lambda: np.zeros(0, np.int32))
+    line: int = 0
+
+    def __len__(self) -> int:
+        return len(self.radii)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything a picture depends on. Built by `clrt.scene.build` from a text, or by hand.
+
+    `depth` is the greatest number of reflections and refractions in a row (0: none are followed).
+    `warnings` are counted facts worth telling, one line each, such as degenerate triangles.
+    """
+
+    camera: Camera
+    lights: tuple[PointLight, ...]
+    materials: tuple[Material, ...]
+    objects: tuple[MeshObject, ...]
+    spheres: Spheres = field(default_factory=Spheres)
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    depth: int = 5
+    source: str = "<scene>"
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def triangle_count(self) -> int:
+        return sum(len(o) for o in self.objects)
+
+    def with_size(self, width: int, height: int) -> Scene:
+        """The same scene seen at another resolution (see Camera.with_size)."""
+        return replace(self, camera=self.camera.with_size(width, height))
