@@ -1,0 +1,107 @@
+"""clrt: a ray tracer in Python and OpenCL for machines without a GPU.
+
+    import clrt
+    image = clrt.render("scene.txt")
+    image.save("scene.png")
+
+Importing it costs nothing: NumPy, PyOpenCL and Pillow are imported by the first call that needs them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from clrt.errors import ClrtError, DeviceError, LimitError, MeshError, SceneError
+
+if TYPE_CHECKING:
+    from clrt.device.context import DeviceInfo
+    from clrt.image.image import Image
+    from clrt.scene.model import Scene
+    from clrt.stats import ObjectStats, RunStats
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "ClrtError", "DeviceError", "Image", "LimitError", "MeshError", "ObjectStats", "RunStats", "Scene", "SceneError",
+    "devices", "load", "render",
+]  # fmt: skip
+
+_LAZY = {
+    "Image": "clrt.image.image",
+    "Scene": "clrt.scene.model",
+    "RunStats": "clrt.stats",
+    "ObjectStats": "clrt.stats",
+}
+
+
+def load(path: str | PathLike[str], *, right_handed: bool = False, split_objects: bool = False) -> Scene:
+    """Read and check a scene text.
+
+    right_handed : mirror x, for files made in right-handed axes
+    split_objects : make each connected component of triangles an object, where the text marks none
+
+    Raises SceneError with one line a fault, OSError where the file cannot be read.
+    """
+    from clrt.scene.build import load_scene
+
+    return load_scene(path, right_handed=right_handed, split_objects=split_objects)
+
+
+def render(
+    scene: Scene | str | PathLike[str],
+    *,
+    size: tuple[int, int] | None = None,
+    tree: str = "sah",
+    device: str | None = None,
+    precision: str = "watertight",
+    depth: int | None = None,
+    count: bool = False,
+    progress: Callable[[str, float], None] | None = None,
+) -> Image:
+    """The picture of a scene, or of a scene text; its `stats` are the figures of the run.
+
+    size : (width, height) in pixels instead of the scene's own
+    tree : "sah", or "median" for the splitter of the classic report
+    device : part of a name that `devices()` lists
+    depth : reflections and refractions in a row, instead of the scene's own
+    count : count rays and tests in a second pass
+    progress : called with a phase and how much of it is done, 0 to 1
+
+    Raises SceneError, DeviceError, LimitError; OSError where a file cannot be read.
+    """
+    import time
+
+    from clrt.renderer import render as render_scene
+    from clrt.scene.model import Scene
+
+    start = time.perf_counter()
+    loaded = scene if isinstance(scene, Scene) else load(scene)
+    read_s = time.perf_counter() - start
+    image = render_scene(
+        loaded, size=size, tree=tree, device=device, precision=precision, depth=depth, count=count, progress=progress
+    )
+    if image.stats is not None and loaded is not scene:
+        image.stats.read_s = read_s
+        image.stats.total_s += read_s
+    return image
+
+
+def devices() -> list[DeviceInfo]:
+    """The OpenCL devices of this machine, the one that is used by default marked so. Raises DeviceError where there is no OpenCL."""
+    from clrt.device.context import list_devices
+
+    return list_devices()
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LAZY:
+        raise AttributeError(f"module 'clrt' has no attribute {name!r}")
+    import importlib
+
+    return getattr(importlib.import_module(_LAZY[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,5 @@
+"""`python -m clrt`, the same as `clrt`."""
+
+from clrt.cli.main import main
+
+main()

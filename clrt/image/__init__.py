@@ -1,0 +1,1 @@
+"""Pictures and their writers, one a file."""

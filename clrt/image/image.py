@@ -1,0 +1,97 @@
+"""The picture that a render returns: linear numbers, and how they become bytes."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from os import PathLike, fspath
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from clrt.errors import ClrtError
+from clrt.files import atomic_write, check_writable
+from clrt.image import png, ppm
+from clrt.stats import RunStats
+
+_WRITERS: dict[str, Callable[[BinaryIO, NDArray[np.uint8], bool], None]] = {".png": png.write, ".ppm": ppm.write}
+
+_BLOCK_ROWS = 64  #: rows encoded at a time, so that float64 work arrays stay in the cache
+
+
+class Image:
+    """A picture.
+
+    pixels : (height, width, 3) float32, linear red, green, blue, not clamped; row 0 at the top
+    stats : the figures of the run that made it, or None
+    """
+
+    def __init__(self, pixels: ArrayLike, stats: RunStats | None = None) -> None:
+        """Raises ValueError where `pixels` is not (height, width, 3) with at least one pixel."""
+        self.pixels: NDArray[np.float32] = np.asarray(pixels, dtype=np.float32)
+        self.stats = stats
+        if self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or self.pixels.size == 0:
+            raise ValueError(f"pixels must have the shape (height, width, 3), not {self.pixels.shape}")
+
+    @property
+    def width(self) -> int:
+        return int(self.pixels.shape[1])
+
+    @property
+    def height(self) -> int:
+        return int(self.pixels.shape[0])
+
+    def __repr__(self) -> str:
+        return f"<clrt.Image {self.width}x{self.height}>"
+
+    def to_uint8(self, srgb: bool = False) -> NDArray[np.uint8]:
+        """(height, width, 3) uint8: clamped to [0, 1], optionally sRGB-encoded, 255 x rounded half up.
+
+        The products are formed in float64, where they are exact, so that each byte is the correctly rounded one. What is
+        not a number becomes 0, with a RuntimeWarning that counts the pixels.
+        """
+        out = np.empty(self.pixels.shape, np.uint8)
+        bad = 0
+        for row in range(0, self.height, _BLOCK_ROWS):
+            block = self.pixels[row : row + _BLOCK_ROWS].astype(np.float64)
+            nan = np.isnan(block)
+            bad += int(nan.any(axis=-1).sum())
+            block[nan] = 0.0
+            np.clip(block, 0.0, 1.0, out=block)
+            encoded = encode_srgb(block) if srgb else block
+            out[row : row + _BLOCK_ROWS] = np.floor(255.0 * encoded + 0.5)
+        if bad:
+            noun = "pixel is" if bad == 1 else "pixels are"
+            warnings.warn(f"{bad} {noun} not a number and shown as black", RuntimeWarning, stacklevel=2)
+        return out
+
+    def save(self, path: str | PathLike[str], *, srgb: bool = False) -> None:
+        """Write a .png or .ppm, whole or not at all; `srgb` encodes, else the linear values are written.
+
+        Raises ClrtError for any other ending, OSError with the path in it where it cannot be written.
+        """
+        write = _WRITERS[check_format(path)]
+        check_writable(path)
+        pixels = self.to_uint8(srgb)
+        with atomic_write(path) as file:
+            write(file, pixels, srgb)
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows."""
+        return png.encode(self.to_uint8())
+
+
+def check_format(path: str | PathLike[str]) -> str:
+    """The ending of `path` in lower case. Raises ClrtError where it is none that can be written."""
+    suffix = Path(path).suffix.lower()
+    if suffix not in _WRITERS:
+        found = f"the ending {suffix}" if suffix else "no ending"
+        raise ClrtError(f"{fspath(path)}: a picture ends in .png or .ppm, this has {found}")
+    return suffix
+
+
+def encode_srgb(linear: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The transfer function of IEC 61966-2-1 (1999) on values in [0, 1]."""
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
