@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
-import secrets
 import shutil
 from collections.abc import Iterator
 from os import PathLike
@@ -21,40 +21,38 @@ def atomic_write(path: str | PathLike[str]) -> Iterator[BinaryIO]:
     The bytes go to a hidden file in the same folder, which is then renamed; on any exception, Ctrl-C included, it is removed and a
     file of that name stays as it was. A link is followed. What is no regular file, such as /dev/stdout, is written to directly.
 
-    Raises OSError, always with `path` in it.
+    Raises OSError; where writing itself fails, as on a full disk, with `path` in it.
     """
     target = os.path.realpath(path)
+    in_place = os.path.exists(target) and not os.path.isfile(target)
+    part = target if in_place else os.path.join(os.path.dirname(target), f".clrt-{os.urandom(6).hex()}.part")
     try:
-        if os.path.exists(target) and not os.path.isfile(target):
-            with open(target, "wb") as file:
-                yield file
-        else:
-            with _beside(target) as file:
-                yield file
+        # Not tempfile: the file gets the permissions that the user's umask gives, not 0600.
+        with (
+            contextlib.nullcontext() if in_place else _replacing(target, part),
+            open(part, "wb" if in_place else "xb") as file,
+        ):
+            yield file
     except OSError as error:
-        if error.errno is None:
+        if error.errno is None or error.filename not in (None, part):
             raise
         raise OSError(error.errno, os.strerror(error.errno), os.fspath(path)) from error
 
 
 @contextlib.contextmanager
-def _beside(target: str) -> Iterator[BinaryIO]:
-    """A new file in the folder of `target` that replaces it when the block ends well."""
-    part = os.path.join(os.path.dirname(target), f".clrt-{secrets.token_hex(6)}.part")
+def _replacing(target: str, part: str) -> Iterator[None]:
+    """Put the file `part` in the place of `target` when the block ends well; remove it in any case."""
     _unfinished.add(part)
     try:
-        # Mode "x" and not tempfile: the file gets the permissions that the user's umask gives, not 0600.
-        with open(part, "xb") as file:
-            yield file
+        yield
         if os.path.exists(target):
             shutil.copymode(target, part)
         os.replace(part, target)
     finally:
-        discard(part)
+        _discard(part)
 
 
-def discard(part: str) -> None:
-    """Remove an unfinished file, if it is still there."""
+def _discard(part: str) -> None:
     with contextlib.suppress(OSError):
         os.unlink(part)
     _unfinished.discard(part)
@@ -63,16 +61,16 @@ def discard(part: str) -> None:
 def discard_unfinished() -> None:
     """Remove what is being written: for a process that is about to end without unwinding its stack."""
     for part in tuple(_unfinished):
-        discard(part)
+        _discard(part)
 
 
 def check_writable(path: str | PathLike[str]) -> None:
-    """Raise OSError, with the path in it, where `path` cannot be written: said before a long run, not after it."""
-    target = Path(os.path.realpath(path))
+    """Raise OSError, with the path in it, where `path` cannot be written: to be said before a long run, not after it."""
+    name, target = os.fspath(path), Path(os.path.realpath(path))
     if target.is_dir():
-        raise IsADirectoryError(21, "is a folder, not a file", os.fspath(path))
+        raise IsADirectoryError(errno.EISDIR, "this is a folder; give the name of a file", name)
     if not target.parent.is_dir():
-        raise FileNotFoundError(2, f"there is no folder {os.fspath(Path(path).parent)}", os.fspath(path))
+        raise FileNotFoundError(errno.ENOENT, f"there is no folder {target.parent}", name)
     needed = target if target.exists() and not target.is_file() else target.parent
     if not os.access(needed, os.W_OK):
-        raise PermissionError(13, "no permission to write there", os.fspath(path))
+        raise PermissionError(errno.EACCES, f"no permission to write to {needed}", name)

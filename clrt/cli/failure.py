@@ -1,0 +1,61 @@
+"""What went wrong, as text on standard error and an exit code.
+
+    0    done
+    1    a fault of clrt: the traceback, and a line that asks for a report
+    2    something the user can mend: one line, no traceback
+    130  interrupted
+
+With CLRT_DEBUG=1 in the environment every failure shows its traceback.
+"""
+
+from __future__ import annotations
+
+import os
+import traceback
+
+import click
+
+from clrt.cli.interrupt import EXIT_CODE as INTERRUPTED
+from clrt.errors import ClrtError, SceneError
+
+FAULT = 1
+USER = 2
+
+
+def report(error: BaseException) -> int:
+    """Print `error` and return the exit code."""
+    # click turns KeyboardInterrupt into Abort, and EOFError, too, which would be a fault.
+    if isinstance(error, KeyboardInterrupt | click.Abort) and not isinstance(error.__cause__, EOFError):
+        click.echo("clrt: interrupted", err=True)
+        return INTERRUPTED
+    message = _message(error)
+    if message is None or os.environ.get("CLRT_DEBUG") == "1":
+        click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+    if message is None:
+        click.echo("clrt: this is a fault of clrt, not of the scene; please report it with the lines above and the scene", err=True)
+        return FAULT
+    click.echo(message, err=True)
+    return USER
+
+
+def warn(message: str) -> None:
+    click.echo(f"clrt: warning: {message}", err=True)
+
+
+def _message(error: BaseException) -> str | None:
+    """The text for something the user can mend, or None for a fault."""
+    if isinstance(error, SceneError):
+        return str(error)  # each of its lines starts with file:line:column
+    if isinstance(error, ClrtError):
+        return f"clrt: error: {error}"
+    if isinstance(error, click.UsageError):
+        command = error.ctx.command_path if error.ctx else "clrt"
+        return f"clrt: error: {error.format_message()} (see {command.removesuffix(' render')} --help)"
+    if isinstance(error, click.ClickException):
+        return f"clrt: error: {error.format_message()}"
+    # An OSError without a file is none of input or output: a fault.
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"clrt: error: {click.format_filename(error.filename)}: {error.strerror}"
+    if isinstance(error, MemoryError):
+        return "clrt: error: not enough memory; a smaller picture (--size) or a smaller scene takes less"
+    return None

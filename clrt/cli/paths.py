@@ -1,0 +1,52 @@
+"""Are the files of a command line there, and can they be written? Asked before the work, not after it."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from clrt.errors import ClrtError
+from clrt.files import check_writable
+
+DEFAULT_SCENE = "input.txt"  #: rendered where no scene is given
+
+_COMMANDS = ("devices", "convert", "make", "render")
+_MESHES = {".obj", ".ply", ".stl", ".off", ".gltf", ".glb"}
+
+
+def check_scene(path: Path) -> None:
+    """Raise ClrtError, with the nearest name there is, where `path` is no file."""
+    if path.is_dir():
+        raise ClrtError(f"{path}: this is a folder; give a scene text")
+    if not path.exists():
+        raise ClrtError(_missing(path))
+    if path.suffix.lower() in _MESHES:
+        raise ClrtError(f"{path}: this is a mesh; `clrt convert {path} scene.txt` makes a scene of it")
+
+
+def check_outputs(inputs: Mapping[str, Path], outputs: Mapping[str, Path | None]) -> None:
+    """Raise where an output cannot be written (OSError), or is an input or another output (ClrtError). Keys say what a path is."""
+    taken = {os.path.realpath(path): what for what, path in inputs.items()}
+    for what, path in outputs.items():
+        if path is None:
+            continue
+        check_writable(path)
+        real = os.path.realpath(path)
+        if real in taken and (path.is_file() or not path.exists()):
+            raise ClrtError(f"{path}: this is the {taken[real]}, too; give the {what} another name")
+        taken[real] = what
+
+
+def _missing(path: Path) -> str:
+    """What to say of a file that is not there."""
+    name = str(path)
+    if path.parent == Path() and (near := difflib.get_close_matches(name, _COMMANDS, 1, 0.7)) and not path.suffix:
+        return f"no command and no file is called {name}; did you mean `clrt {near[0]}`?"
+    if not path.parent.is_dir():
+        return f"{name}: no such file; there is no folder {path.parent}"
+    files = [entry.name for entry in path.parent.iterdir() if entry.is_file()]
+    if near := difflib.get_close_matches(path.name, files, 1, 0.5):
+        return f"{name}: no such file; did you mean {path.parent / near[0]}?"
+    return f"{name}: no such file"

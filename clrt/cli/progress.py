@@ -1,0 +1,73 @@
+"""A progress bar on standard error, for a person who waits."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.live import Live
+
+_PATIENCE_S = 1.0  #: what is done sooner shows nothing
+
+_WORDS = {
+    "read": "reading the scene", "trees": "building the trees", "compile": "compiling the kernels", "render": "rendering",
+    "count": "counting rays and tests", "write": "writing the picture", "convert": "converting", "make": "making",
+}  # fmt: skip
+_AT_ONCE = {"compile"}
+
+
+class PhaseProgress:
+    """A context manager to be called with (phase, fraction 0 to 1). Shows nothing where standard error is no terminal.
+
+    The display is drawn by a thread of its own several times a second, so that a phase that reports only its start is seen to run.
+    """
+
+    def __init__(self, *, quiet: bool = False) -> None:
+        self._live: Live | None = None
+        self._quiet = quiet
+        self._phase = ""
+        self._fraction = 0.0
+        self._start = self._phase_start = time.monotonic()
+
+    def __call__(self, phase: str, fraction: float) -> None:
+        if phase != self._phase:
+            self._phase, self._phase_start = phase, time.monotonic()
+        self._fraction = min(max(fraction, 0.0), 1.0)
+
+    def __enter__(self) -> PhaseProgress:
+        if not self._quiet and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.live import Live
+
+            self._live = Live(console=Console(stderr=True), get_renderable=self._draw, transient=True, refresh_per_second=8)
+            self._live.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def _draw(self) -> RenderableType:
+        """One line: a status while no fraction is known, else a bar, per cent and what remains. No line in the first second."""
+        from rich.console import Group
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+
+        now = time.monotonic()
+        elapsed = now - self._phase_start
+        if not self._phase or (now - self._start < _PATIENCE_S and self._phase not in _AT_ONCE):
+            return Group()
+        words = _WORDS.get(self._phase, self._phase)
+        line = Table.grid(padding=(0, 1))
+        if self._fraction > 0.0:
+            left = elapsed * (1.0 - self._fraction) / self._fraction
+            bar = ProgressBar(total=1.0, completed=self._fraction, width=32)
+            line.add_row(words, bar, f"{self._fraction:4.0%}", f"{left:.0f} s left")
+        else:
+            bar = ProgressBar(total=None, pulse=True, width=32)
+            line.add_row(words, bar, f"{elapsed:.0f} s")
+        return line

@@ -1,0 +1,153 @@
+"""`clrt scene.txt`: read, render, write, print the figures."""
+
+from __future__ import annotations
+
+import re
+import time
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from clrt.cli import failure, paths
+from clrt.cli.progress import PhaseProgress
+from clrt.errors import ClrtError
+
+if TYPE_CHECKING:
+    from clrt.image.image import Image
+    from clrt.scene.model import Scene
+
+_MAX_SIDE = 65535  #: pixels; the renderer's limit on memory comes well before
+
+
+def parse_size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
+    """WIDTHxHEIGHT -> (width, height). Raises click.BadParameter."""
+    if value is None:
+        return None
+    match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", value.lower())
+    if match is None:
+        raise click.BadParameter(f"{value!r} is no size; write width x height in pixels, such as 640x480")
+    width, height = int(match[1]), int(match[2])
+    if not (1 <= width <= _MAX_SIDE and 1 <= height <= _MAX_SIDE):
+        raise click.BadParameter(f"{value!r}: width and height go from 1 to {_MAX_SIDE}")
+    return width, height
+
+
+@dataclass(frozen=True)
+class Options:
+    """The command line of a render; `scene` is None where it was not given."""
+
+    scene: Path | None
+    out: Path | None
+    size: tuple[int, int] | None
+    tree: str
+    device: str | None
+    depth: int | None
+    precision: str
+    stats: Path | None
+    dump_kernel: Path | None
+    quiet: bool
+    srgb: bool
+    right_handed: bool
+    split_objects: bool
+
+
+_FILE = click.Path(path_type=Path)
+
+
+@click.command("render", short_help="Render a scene; the word is never needed.")
+@click.argument("scene", type=_FILE, required=False)
+@click.option("-o", "--out", type=_FILE, metavar="FILE", help="Picture, .png or .ppm.  [default: SCENE.png in the current folder]")
+@click.option("--size", callback=parse_size, metavar="WxH", help="Width and height in pixels, instead of the scene's.")
+@click.option("--tree", type=click.Choice(["sah", "median"]), default="sah", show_default=True, help="How the kd-trees are split.")
+@click.option("--device", metavar="NAME", help="Part of the name of an OpenCL device; `clrt devices` lists them.")
+@click.option("--depth", type=click.IntRange(min=0), metavar="N", help="Reflections and refractions in a row, instead of the scene's.")
+@click.option("--precision", type=click.Choice(["watertight"]), default="watertight", show_default=True, help="How rays meet triangles.")
+@click.option("--stats", type=_FILE, metavar="FILE", help="Write the figures as JSON; counts rays and tests in a second pass.")
+@click.option("--dump-kernel", type=_FILE, metavar="FILE", help="Write the OpenCL program that is compiled for this scene.")
+@click.option("--srgb", is_flag=True, help="Encode the picture as sRGB; without it the linear values are written.")
+@click.option("--right-handed", is_flag=True, help="Mirror x: for scenes made in right-handed axes.")
+@click.option("--split-objects", is_flag=True, help="Make each connected component an object, where the scene marks none.")
+@click.option("-q", "--quiet", is_flag=True, help="Print no figures and no progress.")
+def render(**arguments: Any) -> None:
+    """Render SCENE to a picture. The same as `clrt SCENE`."""
+    start = time.perf_counter()
+    options = Options(**arguments)
+    scene_path = _scene_path(options)
+    picture = options.out or Path(scene_path.stem + ".png")
+    _check_files(options, scene_path, picture)
+    with PhaseProgress(quiet=options.quiet) as progress:
+        scene, read_s = _read(options, scene_path, progress)
+        image = _render(options, scene, progress)
+        write_s = _write(options, image, picture, progress)
+    stats = image.stats
+    if stats is None:
+        return
+    stats.read_s, stats.write_s = read_s, write_s
+    stats.total_s = time.perf_counter() - start - stats.count_s
+    if options.stats is not None:
+        stats.write_json(options.stats)
+    if not options.quiet:
+        from clrt.cli.report import print_report
+
+        print_report(stats, picture)
+
+
+def _scene_path(options: Options) -> Path:
+    if options.scene is not None:
+        return options.scene
+    if Path(paths.DEFAULT_SCENE).exists():
+        return Path(paths.DEFAULT_SCENE)
+    raise ClrtError(f"no scene is given, and there is no {paths.DEFAULT_SCENE} in the current folder")
+
+
+def _check_files(options: Options, scene_path: Path, picture: Path) -> None:
+    """Raise now what would else be said after the work. Imports nothing heavy before the cheap checks have passed."""
+    paths.check_scene(scene_path)
+    outputs = {"picture": picture, "file of figures": options.stats, "kernel": options.dump_kernel}
+    paths.check_outputs({"scene": scene_path}, outputs)
+    from clrt.image.image import check_format
+
+    check_format(picture)
+
+
+def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene, float]:
+    """The scene and the seconds it took; its warnings are printed."""
+    from clrt.scene.build import load_scene
+
+    progress("read", 0.0)
+    start = time.perf_counter()
+    scene = load_scene(path, right_handed=options.right_handed, split_objects=options.split_objects)
+    for warning in scene.warnings:
+        failure.warn(warning)
+    return scene, time.perf_counter() - start
+
+
+def _render(options: Options, scene: Scene, progress: PhaseProgress) -> Image:
+    from clrt.renderer import render as render_scene
+
+    return render_scene(
+        scene,
+        size=options.size,
+        tree=options.tree,
+        device=options.device,
+        precision=options.precision,
+        depth=options.depth,
+        count=options.stats is not None,
+        progress=progress,
+        dump_kernel=options.dump_kernel,
+    )
+
+
+def _write(options: Options, image: Image, picture: Path, progress: PhaseProgress) -> float:
+    """Write the picture; the seconds it took. Warnings about its pixels are printed."""
+    progress("write", 0.0)
+    start = time.perf_counter()
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RuntimeWarning)
+        image.save(picture, srgb=options.srgb)
+    for warning in caught:
+        failure.warn(str(warning.message))
+    return time.perf_counter() - start

@@ -1,0 +1,63 @@
+"""`clrt convert` and `clrt make`: scene texts from meshes and from formulae."""
+
+from __future__ import annotations
+
+import difflib
+from pathlib import Path
+
+import click
+
+from clrt.cli import paths
+from clrt.cli.progress import PhaseProgress
+from clrt.errors import ClrtError
+
+_FILE = click.Path(path_type=Path)
+
+
+@click.command("convert")
+@click.argument("mesh", type=_FILE)
+@click.argument("scene", type=_FILE)
+def convert(mesh: Path, scene: Path) -> None:
+    """Make a scene of a mesh (.obj, .ply, .stl, ...).
+
+    Adds a camera and a light that fit it."""
+    if not mesh.is_file():
+        raise ClrtError(f"{mesh}: no such file")
+    paths.check_outputs({"mesh": mesh}, {"scene": scene})
+    from clrt.convert import convert as convert_mesh
+
+    with PhaseProgress() as progress:
+        progress("convert", 0.0)
+        summary = convert_mesh(mesh, scene)
+    click.echo(summary)
+
+
+class _Make(click.Command):
+    """Lists the kinds at the end of its help, read only when the help is asked for."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        from clrt.generate import KINDS
+
+        with formatter.section("Kinds"):
+            formatter.write_dl(list(KINDS.items()))
+
+
+@click.command("make", cls=_Make)
+@click.argument("kind")
+@click.option("-o", "--out", type=_FILE, required=True, metavar="FILE", help="Scene text to write.")
+@click.option("--triangles", type=click.IntRange(min=1), default=10_000, show_default=True, metavar="N", help="About how many.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N", help="Of the random numbers.")
+def make(kind: str, out: Path, triangles: int, seed: int) -> None:
+    """Make a scene of any size, for trials and measurements."""
+    from clrt.generate import KINDS
+    from clrt.generate import make as make_scene
+
+    if kind not in KINDS:
+        near = difflib.get_close_matches(kind, list(KINDS), 1)
+        hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(KINDS)}"
+        raise ClrtError(f"no kind of scene is called {kind}; {hint}")
+    paths.check_outputs({}, {"scene": out})
+    with PhaseProgress() as progress:
+        progress("make", 0.0)
+        summary = make_scene(kind, out, triangles, seed)
+    click.echo(summary)
