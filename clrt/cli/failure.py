@@ -44,8 +44,8 @@ def warn(message: str) -> None:
 
 def _message(error: BaseException) -> str | None:
     """The text for something the user can mend, or None for a fault."""
-    if isinstance(error, SceneError):
-        return str(error)  # each of its lines starts with file:line:column
+    if isinstance(error, SceneError) and ": error: " in str(error):
+        return str(error)  # each of its lines starts with file:line:column: error
     if isinstance(error, ClrtError):
         return f"clrt: error: {error}"
     if isinstance(error, click.UsageError):

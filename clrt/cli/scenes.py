@@ -17,10 +17,12 @@ _FILE = click.Path(path_type=Path)
 @click.command("convert")
 @click.argument("mesh", type=_FILE)
 @click.argument("scene", type=_FILE)
-def convert(mesh: Path, scene: Path) -> None:
+@click.option("--smooth", is_flag=True, help="Give each corner a normal, the mean of the faces around it.")
+def convert(mesh: Path, scene: Path, smooth: bool) -> None:
     """Make a scene of a mesh (.obj, .ply, .stl, ...).
 
-    Adds a camera and a light that fit it."""
+    The mesh is scaled to fit the view and gets a material and a light.
+    """
     if not mesh.is_file():
         raise ClrtError(f"{mesh}: no such file")
     paths.check_outputs({"mesh": mesh}, {"scene": scene})
@@ -28,7 +30,7 @@ def convert(mesh: Path, scene: Path) -> None:
 
     with PhaseProgress() as progress:
         progress("convert", 0.0)
-        summary = convert_mesh(mesh, scene)
+        summary = convert_mesh(mesh, scene, smooth)
     click.echo(summary)
 
 
