@@ -1,0 +1,130 @@
+"""Declarations -> checked Scene: what the lines of a scene text mean together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from clrt.scene.camera import build_camera
+from clrt.scene.faults import Faults
+from clrt.scene.grammar import LETTERS
+from clrt.scene.model import FloatArray, Material, MeshObject, PointLight, Scene, Spheres
+from clrt.scene.objects import build_objects, material_of
+from clrt.scene.text import Declarations, read_declarations, read_file
+from clrt.scene.words import WORDS, Draft
+
+
+def load_scene(path: str | PathLike[str], *, right_handed: bool = False, split_objects: bool = False) -> Scene:
+    """Read and check the scene text of a file.
+
+    right_handed : mirror x, for files made in right-handed axes
+    split_objects : make each connected component of triangles an object, where no O line closes one
+
+    Raises SceneError with one `file:line:column: error: ...` line a fault, also where the file cannot be read.
+    """
+    return parse_scene(read_file(Path(path)), str(path), right_handed=right_handed, split_objects=split_objects)
+
+
+def parse_scene(text: str, source: str = "<text>", *, right_handed: bool = False, split_objects: bool = False) -> Scene:
+    """Check a scene text that is in memory; `source` stands for the file's name in messages. Otherwise as `load_scene`."""
+    faults = Faults(source)
+    if not text.strip("\ufeff \t\r\n"):
+        faults.add(1, 1, "the text is empty; a scene has at least the lines E, V, F, R, M and a T or an S")
+        faults.raise_if_any()
+    found = read_declarations(text, source, faults)
+    _check_primitives(found, faults)
+    _check_materials(found, faults)
+    _check_words(found, faults)
+    camera = build_camera(found, faults)
+    faults.raise_if_any()
+    assert camera is not None  # a camera that cannot be built is a fault
+
+    warnings: list[str] = []
+    objects = build_objects(found, split_objects, warnings)
+    draft = Draft(_materials(found), _lights(found))
+    for call in found.words:
+        WORDS[call.name].apply(draft, call)
+    if not draft.lights:
+        warnings.append("there is no light (L); only the ambient part of the materials is seen")
+    scene = Scene(
+        camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,
+        source, tuple(warnings),
+    )  # fmt: skip
+    return mirrored(scene) if right_handed else scene
+
+
+def _check_primitives(found: Declarations, faults: Faults) -> None:
+    """There is something to render, and a material above the first of it."""
+    first = {letter: int(lines[0]) for letter in "TSM" if len(lines := found.lines_of(letter))}
+    if "T" not in first and "S" not in first:
+        faults.add(1, 1, 'there is nothing to render; add a triangle, such as "T 0 0 1 1 0 1 0 1 1", or a sphere, such as "S 0 0 2 1"')
+        return
+    line, letter = min((first[letter], letter) for letter in "TS" if letter in first)
+    if line < first.get("M", line + 1):
+        what = "a triangle" if letter == "T" else "a sphere"
+        column = found.token(line, 0).column
+        faults.add(line, column, f'{what} before any material; add a line above it, such as "M 1 1 1 0.1 0.9 0.3 20 0"')
+
+
+def _check_materials(found: Declarations, faults: Faults) -> None:
+    """An index of refraction of 0 is only what files write where nothing is refracted."""
+    rows = found.get("M", 10)
+    for line in rows.lines[(rows.values[:, 8] > 0.0) & (rows.values[:, 9] == 0.0)].tolist():
+        faults.add(line, found.token(line, 10).column, "Nr must be greater than 0 where Refract is; glass has 1.5, found 0")
+
+
+def _check_words(found: Declarations, faults: Faults) -> None:
+    first: dict[str, int] = {}
+    for call in found.words:
+        if call.name in first and WORDS[call.name].once:
+            column = found.token(call.line, 0).column
+            faults.add(call.line, column, f"a second {call.name} line; the first is line {first[call.name]}, remove one")
+        first.setdefault(call.name, call.line)
+
+
+def _in_order(found: Declarations, letter: str) -> list[tuple[int, list[float]]]:
+    """Line number and numbers of each line of a letter with several forms."""
+    forms = [found.get(letter, fields) for fields in LETTERS[letter]]
+    return sorted(pair for rows in forms for pair in zip(rows.lines.tolist(), rows.values.tolist(), strict=True))
+
+
+def _materials(found: Declarations) -> list[Material]:
+    """The materials in the order of their lines; 8 numbers leave Refract 0 and Nr 1."""
+    rows = [(line, [*values, 0.0, 1.0][:10]) for line, values in _in_order(found, "M")]
+    return [Material((v[0], v[1], v[2]), v[3], v[4], v[5], v[6], v[7], v[8], v[9], line) for line, v in rows]
+
+
+def _lights(found: Declarations) -> list[PointLight]:
+    """The lights in the order of their lines; 3 numbers leave them white."""
+    rows = [(line, [*values, 1.0, 1.0, 1.0]) for line, values in _in_order(found, "L")]
+    return [PointLight((v[0], v[1], v[2]), (v[3], v[4], v[5]), line) for line, v in rows]
+
+
+def _spheres(found: Declarations) -> Spheres:
+    rows = found.get("S", 4)
+    if not len(rows):
+        return Spheres()
+    return Spheres(rows.values[:, :3].copy(), rows.values[:, 3].copy(), material_of(found, rows.lines), int(rows.lines[0]))
+
+
+def mirrored(scene: Scene) -> Scene:
+    """The same scene with x turned round: right-handed axes as left-handed ones, and back."""
+    spheres = replace(scene.spheres, centers=_flip_x(scene.spheres.centers))
+    camera = replace(scene.camera, eye=_flip_x(scene.camera.eye), corners=_flip_x(scene.camera.corners))
+    lights = tuple(replace(light, position=(0.0 - light.position[0], *light.position[1:])) for light in scene.lights)
+    return replace(scene, camera=camera, lights=lights, objects=tuple(map(_mirrored_object, scene.objects)), spheres=spheres)
+
+
+def _mirrored_object(mesh: MeshObject) -> MeshObject:
+    smooth = None if mesh.vertex_normals is None else _flip_x(mesh.vertex_normals)
+    return replace(mesh, vertices=_flip_x(mesh.vertices), normals=_flip_x(mesh.normals), vertex_normals=smooth)
+
+
+def _flip_x(points: FloatArray) -> FloatArray:
+    """Points (..., 3) with x negated; 0 - x, since -x would make -0.0 of 0.0."""
+    flipped = np.array(points)
+    flipped[..., 0] = 0.0 - flipped[..., 0]
+    return flipped

@@ -1,0 +1,53 @@
+"""The errors of one scene text: collected while it is read, then told all at once."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+from clrt.errors import SceneError
+
+MOST_TOLD = 20  #: errors written out before the rest is only counted
+LONGEST_SHOWN = 40  #: characters of an offending token that a message repeats
+
+
+def shown(token: str) -> str:
+    """The token in quotes, shortened, with control characters made visible."""
+    cut = token if len(token) <= LONGEST_SHOWN else token[:LONGEST_SHOWN] + "..."
+    return '"' + "".join(c if c.isprintable() else f"\\x{ord(c):02x}" for c in cut) + '"'
+
+
+def did_you_mean(token: str, valid: Iterable[str]) -> str:
+    """`; did you mean "depth"?` for the nearest valid word, or nothing where none is near."""
+    if len(token) > LONGEST_SHOWN:
+        return ""
+    near = difflib.get_close_matches(token.lower(), list(valid), n=1)
+    return f'; did you mean "{near[0]}"?' if near else ""
+
+
+class Faults:
+    """Errors with their places, of one source. Lines and columns count characters from 1."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+        self._found: list[tuple[int, int, str]] = []
+        self._lines: set[int] = set()
+
+    def add(self, line: int, column: int, message: str) -> None:
+        self._found.append((line, column, message))
+        self._lines.add(line)
+
+    def on_line(self, line: int) -> bool:
+        """Whether a fault of this line has been noted."""
+        return line in self._lines
+
+    def raise_if_any(self) -> None:
+        """Raise a SceneError that holds the first 20 errors in the order of the text, and how many more there are."""
+        if not self._found:
+            return
+        found = sorted(self._found, key=lambda fault: fault[:2])
+        told = [f"{self.source}:{line}:{column}: error: {message}" for line, column, message in found[:MOST_TOLD]]
+        more = len(found) - len(told)
+        if more:
+            told.append(f"{self.source}: {more} more error{'s' if more > 1 else ''} not shown")
+        raise SceneError("\n".join(told))

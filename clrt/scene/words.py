@@ -1,0 +1,143 @@
+"""The words of a scene text: `word positional... key=value...`, and the one registry where they plug in.
+
+To add a word, write its grammar and what it does to the draft of the scene, and enter it in `WORDS`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from clrt.scene.faults import Faults, did_you_mean, shown
+from clrt.scene.grammar import Field, color_fields
+from clrt.scene.model import Material, PointLight
+from clrt.scene.tokens import Token, read_in_range
+
+GREATEST_DEPTH = 64  #: reflections and refractions in a row; bounds the stacks of every renderer
+
+Value = float | str
+
+_KEY = re.compile(r"([a-z][a-z_]*)=(.*)")
+
+
+@dataclass(frozen=True)
+class Text:
+    """A field that is not a number, such as a path. In double quotes it may hold blanks, commas, `#` and `//`."""
+
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class WordCall:
+    """One line with a word, checked against its grammar: field name -> value, left-out keys with their defaults."""
+
+    name: str
+    line: int
+    values: Mapping[str, Value]
+
+    def number(self, name: str) -> float:
+        """The value of a numeric field."""
+        return float(self.values[name])
+
+    def text(self, name: str) -> str:
+        """The value of a text field."""
+        return str(self.values[name])
+
+
+@dataclass
+class Draft:
+    """What a word may change of a scene; filled from the letters first, then changed by the words in their order."""
+
+    materials: list[Material] = field(default_factory=list)
+    lights: list[PointLight] = field(default_factory=list)
+    background: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    depth: int = 5
+
+
+@dataclass(frozen=True)
+class Word:
+    """The grammar of one word, and its effect.
+
+    positional : required, in this order
+    example : a line that is right, for messages
+    apply : what the line does to the draft
+    keys : written key=value in any order, each with the default of a line that leaves it out
+    once : a second line with the word is an error
+    """
+
+    positional: tuple[Field | Text, ...]
+    example: str
+    apply: Callable[[Draft, WordCall], None]
+    keys: tuple[tuple[Field | Text, Value], ...] = ()
+    once: bool = True
+
+_BACKGROUND = color_fields()
+_DEPTH = Field("depth", low=0.0, high=float(GREATEST_DEPTH), whole=True)
+
+
+def _set_background(draft: Draft, call: WordCall) -> None:
+    draft.background = (call.number("red"), call.number("green"), call.number("blue"))
+
+
+def _set_depth(draft: Draft, call: WordCall) -> None:
+    draft.depth = int(call.number("depth"))
+
+
+WORDS: dict[str, Word] = {
+    "background": Word(_BACKGROUND, "background 0.2 0.3 0.5", _set_background),
+    "depth": Word((_DEPTH,), "depth 5", _set_depth),
+}
+
+
+def read_word(tokens: Sequence[Token], line: int, faults: Faults) -> WordCall | None:
+    """Check a line against the grammar of its word. None, with the faults noted, where it does not fit."""
+    name = tokens[0].text
+    word = WORDS.get(name)
+    if word is None:
+        known = ", ".join(sorted(WORDS))
+        faults.add(line, tokens[0].column, f"unknown word {shown(name)}{did_you_mean(name, WORDS)} (the words: {known})")
+        return None
+    plain = [token for token in tokens[1:] if not _KEY.fullmatch(token.text)]
+    if len(plain) != len(word.positional):
+        place = plain[0] if plain else tokens[0]
+        number = "1 value" if len(word.positional) == 1 else f"{len(word.positional)} values"
+        faults.add(line, place.column, f'{name} takes {number}, as in "{word.example}", found {len(plain)}')
+        return None
+    values: dict[str, Value | None] = {f.name: default for f, default in word.keys}
+    for declared, token in zip(word.positional, plain, strict=True):
+        values[declared.name] = _read_value(declared, token, line, faults)
+    values |= _read_keys(name, word, tokens[1:], line, faults)
+    read = {key: value for key, value in values.items() if value is not None}
+    return WordCall(name, line, read) if len(read) == len(values) else None
+
+
+def _read_keys(name: str, word: Word, tokens: Sequence[Token], line: int, faults: Faults) -> dict[str, Value | None]:
+    """The values of the line's key=value tokens; None under each key whose value is at fault."""
+    declared = {f.name: f for f, _ in word.keys}
+    values: dict[str, Value | None] = {}
+    for token in tokens:
+        match = _KEY.fullmatch(token.text)
+        if match is None:
+            continue
+        key, rest = match[1], Token(match[2], token.column + match.start(2))
+        if key in values:
+            faults.add(line, token.column, f"the key {shown(key)} stands twice on this line")
+        elif key in declared:
+            values[key] = _read_value(declared[key], rest, line, faults)
+        else:
+            listed = ", ".join(declared) or "none"
+            faults.add(line, token.column, f"{name} has no key {shown(key)}{did_you_mean(key, declared)} (its keys: {listed})")
+    return values
+
+
+def _read_value(declared: Field | Text, token: Token, line: int, faults: Faults) -> Value | None:
+    if isinstance(declared, Field):
+        return read_in_range(token, declared, line, faults)
+    if token.left_open:
+        faults.add(line, token.column, f'expected a second double quote after {shown(token.text)} ({declared.name})')
+        return None
+    if not token.unquoted:
+        faults.add(line, token.column, f"expected a text ({declared.name}), found nothing")
+        return None
+    return token.unquoted
