@@ -88,7 +88,7 @@ class _RenderByDefault(click.Group):
 _SETTINGS: MutableMapping[str, Any] = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
-@click.group(cls=_RenderByDefault, help=_HELP, context_settings=_SETTINGS, no_args_is_help=False)
+@click.group("clrt", cls=_RenderByDefault, help=_HELP, context_settings=_SETTINGS, no_args_is_help=False)
 @click.version_option(__version__, prog_name="clrt", message="%(prog)s %(version)s")
 def cli() -> None:
     """The help is `_HELP`."""

@@ -121,7 +121,7 @@ def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene,
     start = time.perf_counter()
     scene = load_scene(path, right_handed=options.right_handed, split_objects=options.split_objects)
     for warning in scene.warnings:
-        failure.warn(warning)
+        failure.warn(f"{scene.source}: {warning}")
     return scene, time.perf_counter() - start
 
 

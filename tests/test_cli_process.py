@@ -1,0 +1,210 @@
+"""The command line as processes: exit codes, Ctrl-C, full disks, terminals. A child's renderer is a stand-in given as source."""
+
+from __future__ import annotations
+
+import os
+import re
+import resource
+import select
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+SCENE = "E 0 0 -1\nV 0 0 1\nF 45\nR 64 48\nL 5 5 -5\nM 0.5 0.5 1 0.1 0.9 0.3 20 0\nT -1 -1 2  1 -1 2  0 1 2\nO\n"
+
+#: a child that renders with the function `render` of the source put in
+CHILD = """
+import hashlib, sys, time, types
+import numpy as np
+from clrt.files import atomic_write
+from clrt.image import png
+from clrt.image.image import Image
+from clrt.stats import ObjectStats, RunStats
+
+def ready():
+    print("ready", flush=True)
+
+def block():
+    "One call into C that no signal ends and that lasts far longer than the test waits."
+    hashlib.pbkdf2_hmac("sha512", b"x", b"y", 60_000_000)
+
+def picture(scene, **arguments):
+    objects = [ObjectStats("an object with a name as long as a path " * 3, 970, 555, 278, 4321, 17, 0.02)]
+    stats = RunStats(scene.source, 64, 48, "sah", "Imaginary CPU " * 8, "watertight", ["shadows"], objects)
+    return Image(np.full((48, 64, 3), 0.5, np.float32), stats)
+
+{source}
+
+module = types.ModuleType("clrt.renderer")
+module.render = render
+sys.modules["clrt.renderer"] = module
+from clrt.cli.main import main
+main()
+"""
+
+BLOCKED = """
+def render(scene, **arguments):
+    ready()
+    block()
+"""
+SLOW = """
+def render(scene, progress, **arguments):
+    ready()
+    for step in range(1000):
+        progress("render", step / 1000)
+        time.sleep(0.01)
+"""
+BLOCKED_IN_WRITING = """
+render = picture
+def write(file, pixels, srgb):
+    file.write(b"half of a picture")
+    file.flush()
+    ready()
+    block()
+import clrt.image.image
+clrt.image.image._WRITERS[".png"] = write
+"""
+QUICK = "render = picture"
+
+
+def start(folder: Path, source: str, *arguments: str, **options: object) -> subprocess.Popen[bytes]:
+    (folder / "scene.txt").write_text(SCENE)
+    command = [sys.executable, "-c", CHILD.replace("{source}", source), "scene.txt", *arguments]
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options}
+    return subprocess.Popen(command, cwd=folder, env=child_environment(), **streams)  # type: ignore[call-overload, no-any-return]
+
+
+def child_environment() -> dict[str, str]:
+    """This one's, with the checkout first on the path and a terminal of 80 columns."""
+    unset = {"CLRT_DEBUG", "NO_COLOR", "FORCE_COLOR", "LINES"}
+    path = str(Path(__file__).parents[1])
+    return {**{k: v for k, v in os.environ.items() if k not in unset}, "PYTHONPATH": path, "COLUMNS": "80", "TERM": "xterm"}
+
+
+def files(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+@pytest.mark.parametrize("source", [SLOW, BLOCKED, BLOCKED_IN_WRITING], ids=["slow", "blocked", "writing"])
+def test_ctrl_c_ends_within_a_second_and_leaves_nothing(tmp_path: Path, source: str) -> None:
+    (tmp_path / "scene.png").write_bytes(b"old")
+    child = start(tmp_path, source)
+    assert child.stdout is not None
+    assert child.stderr is not None
+    assert child.stdout.readline() == b"ready\n"
+    began = time.monotonic()
+    child.send_signal(signal.SIGINT)
+    assert child.wait(20) == 130
+    assert time.monotonic() - began < 1.0
+    assert b"clrt: interrupted" in child.stderr.read()
+    assert files(tmp_path) == ["scene.png", "scene.txt"]
+    assert (tmp_path / "scene.png").read_bytes() == b"old"
+
+
+def test_disk_that_is_full_is_one_line_and_2(tmp_path: Path) -> None:
+    def small_files() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))  # the system refuses to let a file grow beyond it
+
+    child = start(tmp_path, QUICK, "-o", "a.ppm", preexec_fn=small_files)
+    out, error = child.communicate(timeout=20)
+    assert (child.returncode, out) == (2, b"")
+    assert re.fullmatch(rb"clrt: error: a\.ppm: File too large\n", error)
+    assert files(tmp_path) == ["scene.txt"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code"),
+    [(["scene.txt", "-q"], 0), (["missing.txt"], 2), (["scene.txt", "--size", "1"], 2), (["--help"], 0), (["--version"], 0)],
+)
+def test_exit_codes_of_processes(tmp_path: Path, arguments: list[str], code: int) -> None:
+    (tmp_path / "scene.txt").write_text(SCENE)
+    command = [sys.executable, "-c", CHILD.replace("{source}", QUICK), *arguments]
+    done = subprocess.run(command, cwd=tmp_path, env=child_environment(), capture_output=True, check=False)
+    assert done.returncode == code
+    assert b"Traceback" not in done.stderr
+
+
+def test_python_m_clrt_is_the_command(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "clrt", "--version"]
+    done = subprocess.run(command, cwd=tmp_path, env=child_environment(), capture_output=True, check=True)
+    assert done.stdout.startswith(b"clrt ")
+
+
+def test_reader_that_stops_reading_causes_no_traceback(tmp_path: Path) -> None:
+    child = start(tmp_path, QUICK)
+    assert child.stdout is not None
+    assert child.stderr is not None
+    child.stdout.close()
+    child.wait(20)
+    assert b"Traceback" not in child.stderr.read()
+    assert "scene.png" in files(tmp_path)
+
+
+def on_terminal(folder: Path, source: str) -> tuple[str, str]:
+    """Standard output and error of a child that has terminals for both."""
+    readers, writers = zip(os.openpty(), os.openpty(), strict=True)
+    child = start(folder, source, stdout=writers[0], stderr=writers[1])
+    for end in writers:
+        os.close(end)
+    texts = dict.fromkeys(readers, b"")
+    left = set(readers)
+    while left:
+        ready, _, _ = select.select(left, [], [], 20)
+        assert ready, "the child says nothing"
+        for end in ready:
+            try:
+                data = os.read(end, 65536)
+            except OSError:  # Linux says so at the end of a terminal
+                data = b""
+            texts[end] += data
+            if not data:
+                left.discard(end)
+                os.close(end)
+    assert child.wait(20) == 0
+    out, error = (texts[end].decode() for end in readers)
+    return out, error
+
+
+def test_terminal_long_render_shows_a_bar_that_goes_away(tmp_path: Path) -> None:
+    source = """
+def render(scene, progress, **arguments):
+    for step in range(30):
+        progress("render", step / 30)
+        time.sleep(0.05)
+    return picture(scene)
+"""
+    _, error = on_terminal(tmp_path, source)
+    assert "rendering" in error
+    assert re.search(r"\d\d%", error)
+    assert error.index("\x1b[?25l") < error.rindex("\x1b[?25h")  # the cursor is hidden, then shown again
+    assert "\x1b[2K" in error  # the line is erased
+
+
+def test_terminal_quick_render_shows_no_bar_and_80_columns_hold(tmp_path: Path) -> None:
+    out, error = on_terminal(tmp_path, QUICK)
+    assert "rendering" not in error
+    plain = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", out)
+    assert max(len(line) for line in plain.splitlines()) <= 80
+    assert "970" in plain
+    assert "\x1b[" in out
+
+
+def test_terminal_compiling_is_said_at_once(tmp_path: Path) -> None:
+    source = """
+def render(scene, progress, **arguments):
+    progress("compile", 0.0)
+    time.sleep(0.4)
+    return picture(scene)
+"""
+    assert "compiling" in on_terminal(tmp_path, source)[1]
+
+
+def test_piped_output_is_plain(tmp_path: Path) -> None:
+    out, error = start(tmp_path, QUICK).communicate(timeout=20)
+    assert error == b""
+    assert b"\x1b" not in out
+    assert out.isascii()
