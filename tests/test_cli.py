@@ -221,6 +221,7 @@ def test_mesh_instead_of_a_scene_says_how_to_convert(run: Run, tmp_path: Path) -
         (["--size", "5"], "640x480"),
         (["--depth", "-1"], "--depth"),
         (["--tree", "oak"], "sah"),
+        (["--precision", "perfect"], "watertight"),
         (["--sise", "5x5"], "--size"),
         (["second.txt"], "second.txt"),
     ],

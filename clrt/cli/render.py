@@ -64,7 +64,7 @@ _FILE = click.Path(path_type=Path)
 @click.option("--tree", type=click.Choice(["sah", "median"]), default="sah", show_default=True, help="How the kd-trees are split.")
 @click.option("--device", metavar="NAME", help="Part of the name of an OpenCL device; `clrt devices` lists them.")
 @click.option("--depth", type=click.IntRange(min=0), metavar="N", help="Reflections and refractions in a row, instead of the scene's.")
-@click.option("--precision", type=click.Choice(["watertight"]), default="watertight", show_default=True, help="How rays meet triangles.")
+@click.option("--precision", metavar="NAME", default="watertight", show_default=True, help="How rays meet triangles: fast, watertight.")
 @click.option("--stats", type=_FILE, metavar="FILE", help="Write the figures as JSON; counts rays and tests in a second pass.")
 @click.option("--dump-kernel", type=_FILE, metavar="FILE", help="Write the OpenCL program that is compiled for this scene.")
 @click.option("--srgb", is_flag=True, help="Encode the picture as sRGB; without it the linear values are written.")
@@ -77,7 +77,7 @@ def render(**arguments: Any) -> None:
     options = Options(**arguments)
     scene_path = _scene_path(options)
     picture = options.out or Path(scene_path.stem + ".png")
-    _check_files(options, scene_path, picture)
+    _check(options, scene_path, picture)
     with PhaseProgress(quiet=options.quiet) as progress:
         scene, read_s = _read(options, scene_path, progress)
         image = _render(options, scene, progress)
@@ -103,14 +103,16 @@ def _scene_path(options: Options) -> Path:
     raise ClrtError(f"no scene is given, and there is no {paths.DEFAULT_SCENE} in the current folder")
 
 
-def _check_files(options: Options, scene_path: Path, picture: Path) -> None:
-    """Raise now what would else be said after the work. Imports nothing heavy before the cheap checks have passed."""
+def _check(options: Options, scene_path: Path, picture: Path) -> None:
+    """Raise now what would else be said after the work."""
     paths.check_scene(scene_path)
     outputs = {"picture": picture, "file of figures": options.stats, "kernel": options.dump_kernel}
     paths.check_outputs({"scene": scene_path}, outputs)
     from clrt.image.image import check_format
+    from clrt.precision import rung
 
     check_format(picture)
+    rung(options.precision)
 
 
 def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene, float]:
