@@ -42,7 +42,7 @@ class ObjectStats:
 class RunStats:
     """One run from scene text to picture. Times are seconds of wall time.
 
-    read_s, build_s, compile_s, render_s, write_s : reading the scene, all trees, composing and building the kernels,
+    read_s, build_s, upload_s, compile_s, render_s, write_s : reading the scene, all trees, filling buffers, composing and building the kernels,
         tracing and shading with the transfer of the picture, writing the picture
     count_s : the second pass that counts, which no other time contains
     total_s : from the start of the command to the written picture, without `count_s`; from Python, from `render` to the picture
@@ -61,6 +61,7 @@ class RunStats:
     ray_counts: dict[str, int] | None = None
     read_s: float = 0.0
     build_s: float = 0.0
+    upload_s: float = 0.0
     compile_s: float = 0.0
     render_s: float = 0.0
     count_s: float = 0.0
@@ -138,7 +139,7 @@ class RunStats:
             file.write(text.encode())
 
 
-_TIMES = ("read_s", "build_s", "compile_s", "render_s", "write_s", "total_s", "count_s")
+_TIMES = ("read_s", "build_s", "upload_s", "compile_s", "render_s", "write_s", "total_s", "count_s")
 
 
 def _rate(count: int, seconds: float) -> float | None:

@@ -1,0 +1,1 @@
+"""The OpenCL side: choosing a device, laying out buffers, composing and building programs."""

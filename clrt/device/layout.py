@@ -1,0 +1,75 @@
+"""One NumPy dtype a struct, and the C text made from it: the two cannot drift apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+_C_NAMES = {np.dtype(np.int32): "int", np.dtype(np.float64): "double", np.dtype(np.float32): "float"}
+
+Field = tuple[str, Any] | tuple[str, Any, int | tuple[int, ...]]
+
+
+def struct_dtype(fields: Sequence[Field]) -> np.dtype[np.void]:
+    """An aligned struct as C lays it out. An empty one gets a member, since C has no empty structs."""
+    return np.dtype(list(fields) or [("unused", np.int32)], align=True)
+
+
+def c_struct(name: str, dtype: np.dtype[np.void]) -> str:
+    """The C definition of `dtype`, member by member; NumPy's aligned layout is that of C."""
+    lines = []
+    for member in dtype.names or ():
+        kind = dtype.fields[member][0]  # type: ignore[index]
+        base, shape = (kind.base, kind.shape)
+        lines.append(f"    {_C_NAMES[base]} {member}{''.join(f'[{n}]' for n in shape)};")
+    return "typedef struct {\n" + "\n".join(lines) + f"\n}} {name};\n"
+
+
+def triangle(real: type) -> np.dtype[np.void]:
+    """A triangle for rays of any origin: relative to the local origin, with the bounds of triangle.cl. 64 bytes in float32."""
+    vector: Any = (real, (3,))
+    return struct_dtype([("v0", *vector), ("e1", *vector), ("e2", *vector), ("normal", *vector), ("bound", real), ("normal_bound", real),
+                         ("unused", real, (2,))])  # fmt: skip
+
+
+def edge_planes(real: type) -> np.dtype[np.void]:
+    """A triangle for rays of one shared origin: planes through it and each edge. 64 bytes in float32."""
+    vector: Any = (real, (3,))
+    return struct_dtype([("u", *vector), ("v", *vector), ("w", *vector), ("normal", *vector), ("offset", real), ("bound", real),
+                         ("normal_bound", real), ("unused", real)])  # fmt: skip
+
+
+def object_record(real: type) -> np.dtype[np.void]:
+    """An object's box and the node its tree starts at; `extent` bounds |x| + |y| + |z| of its points plus its longest edge."""
+    return struct_dtype([("lo", real, (3,)), ("hi", real, (3,)), ("extent", real), ("root", np.int32)])
+
+
+def surface(real: type) -> np.dtype[np.void]:
+    """What shading asks of a triangle: unit normals (of the surface, for shading), material, object."""
+    return struct_dtype([("geometric", real, (3,)), ("normal", real, (3,)), ("material", np.int32), ("object", np.int32)])
+
+
+def material(real: type, extra: Sequence[Field]) -> np.dtype[np.void]:
+    """A material: the members every scene needs, then those of the effects it calls for."""
+    return struct_dtype([("color", real, (3,)), ("ambient", real), ("diffuse", real), ("specular", real), ("exponent", real), *extra])
+
+
+def frame(real: type, extra: Sequence[Field]) -> np.dtype[np.void]:
+    """What is one for the whole picture: camera, sizes, background; then the members of effects."""
+    vector: Any = (real, (3,))
+    return struct_dtype([
+        ("eye", np.float64, (3,)), ("local_origin", np.float64, (3,)), ("eye_local", *vector), ("corner", *vector), ("along_row", *vector),
+        ("along_column", *vector), ("twist", *vector), ("background", *vector), ("extent", real), ("width", np.int32), ("height", np.int32),
+        ("object_count", np.int32), ("triangle_slots", np.int32), *extra,
+    ])  # fmt: skip
+
+
+def light(real: type) -> np.dtype[np.void]:
+    """A point light: where it is as given, and relative to the local origin."""
+    return struct_dtype([("given", np.float64, (3,)), ("position", real, (3,)), ("color", real, (3,))])
+
+
+def sphere(real: type) -> np.dtype[np.void]:
+    return struct_dtype([("center", real, (3,)), ("radius", real), ("material", np.int32)])

@@ -1,0 +1,216 @@
+"""Scene and trees to the arrays that the device holds: plain NumPy of the dtypes in layout.py.
+
+Coordinates are taken relative to a local origin in float64 before they are rounded, so that a scene far from zero loses
+nothing; the numbers as given go along in float64 for the tests that need them. Triangles lie in the order in which the
+trees' leaves first name them ("slots"), which keeps a leaf's triangles near each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.device import layout
+from clrt.device.program import frame_dtype, material_dtype
+from clrt.features import Features
+from clrt.kdtree.tree import LEAF, KdTree
+from clrt.precision import Precision
+from clrt.scene.model import MeshObject, Scene
+
+FloatArray = NDArray[np.float64]
+
+
+def local_origin(scene: Scene) -> FloatArray:
+    """The point coordinates are rounded relative to: the middle of all triangles, or of the smallest sphere where there are none.
+
+    A large sphere, such as a floor, does not move it: its centre is far from what is seen of it.
+    """
+    boxes = [(o.vertices.min((0, 1)), o.vertices.max((0, 1))) for o in scene.objects if len(o)]
+    if boxes:
+        lo = np.min([b[0] for b in boxes], 0)
+        hi = np.max([b[1] for b in boxes], 0)
+        return np.asarray(lo / 2.0 + hi / 2.0)
+    if len(scene.spheres):
+        return np.array(scene.spheres.centers[scene.spheres.radii.argmin()])
+    return np.zeros(3)
+
+
+def leaf_order(tree: KdTree, triangles: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The triangles that leaves name, in the order of their first naming: (order, slot of each triangle or -1)."""
+    entries = len(tree.indices)
+    first = np.full(triangles, entries, np.int64)
+    first[tree.indices[::-1]] = np.arange(entries - 1, -1, -1)  # of equal indices the last write stays: the first naming
+    order = np.argsort(first, kind="stable")[: np.count_nonzero(first < entries)]
+    slots = np.full(triangles, -1, np.int64)
+    slots[order] = np.arange(len(order))
+    return order, slots
+
+
+def nodes_of(tree: KdTree, first_node: int, first_index: int) -> NDArray[np.int32]:
+    """(m, 2) int32 node words: inner (bits of the split, child << 2 | axis), leaf (first index, count << 2 | 3)."""
+    leaf = tree.split_axis == LEAF
+    words = np.empty((len(leaf), 2), np.int32)
+    words[:, 0] = np.where(leaf, tree.child + first_index, tree.split_pos.view(np.int32))
+    words[:, 1] = np.where(leaf, (tree.count << 2) | 3, ((tree.child + first_node) << 2) | tree.split_axis)
+    return words
+
+
+def unit_normals(vertices: FloatArray) -> FloatArray:
+    """(n, 3) unit geometric normals; zero for zero area. Edges are scaled first, so that no size over- or underflows."""
+    e1, e2 = vertices[:, 1] - vertices[:, 0], vertices[:, 2] - vertices[:, 0]
+    for e in (e1, e2):
+        size = np.abs(e).max(1, keepdims=True)
+        np.divide(e, size, out=e, where=size > 0)
+    normal = np.cross(e1, e2)
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Packed:
+    """What every program reads; the arrays of effects come from `argument`.
+
+    nodes (m, 2) int32; indices (r,) int32 slots; vertices (s, 3, 3) float64 as given; objects, surfaces, materials, frame: structs
+    prim_ids : (s,) int64 primitive id of each slot
+    """
+
+    scene: Scene
+    origin: FloatArray
+    nodes: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    vertices: FloatArray
+    objects: NDArray[np.void]
+    surfaces: NDArray[np.void]
+    materials: NDArray[np.void]
+    frame: NDArray[np.void]
+    prim_ids: NDArray[np.int64]
+    orders: tuple[NDArray[np.int64], ...]
+    real: type[np.floating]
+
+    @property
+    def slots(self) -> int:
+        return len(self.vertices)
+
+    def argument(self, name: str) -> NDArray[Any]:
+        """The array of the effect's kernel argument called `name`."""
+        return _PACKERS[name](self)
+
+
+def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: Precision) -> Packed:
+    """All arrays of a scene. `trees[i]` is the tree of `scene.objects[i]`, over vertices less `local_origin(scene)`."""
+    real, origin = precision.real, local_origin(scene)
+    nodes, indices, orders = [], [], []
+    objects = np.zeros(len(trees), layout.object_record(real))
+    node = index = slot = 0
+    for number, (item, tree) in enumerate(zip(scene.objects, trees, strict=True)):
+        order, slots = leaf_order(tree, len(item))
+        objects[number] = _object_record(item, tree, origin, node, real)
+        nodes.append(nodes_of(tree, node, index))
+        indices.append((slots[tree.indices] + slot).astype(np.int32))
+        orders.append(order)
+        node, index, slot = node + len(tree.split_axis), index + len(tree.indices), slot + len(order)
+    given = [item.vertices[order] for item, order in zip(scene.objects, orders, strict=True)]
+    vertices = np.concatenate(given) if given else np.zeros((0, 3, 3))
+    return Packed(
+        scene=scene,
+        origin=origin,
+        nodes=np.concatenate(nodes) if nodes else np.zeros((0, 2), np.int32),
+        indices=np.concatenate(indices) if indices else np.zeros(0, np.int32),
+        vertices=vertices,
+        objects=objects,
+        surfaces=_surfaces(scene, orders, vertices, real),
+        materials=_materials(scene, features, precision),
+        frame=_frame(scene, origin, objects, len(vertices), features, precision),
+        prim_ids=np.concatenate([o.first_prim + k for o, k in zip(scene.objects, orders, strict=True)] or [np.zeros(0, np.int64)]),
+        orders=tuple(orders),
+        real=real,
+    )
+
+
+def _object_record(item: MeshObject, tree: KdTree, origin: FloatArray, root: int, real: type[np.floating]) -> NDArray[np.void]:
+    record = np.zeros((), layout.object_record(real))
+    record["lo"], record["hi"] = _down(tree.lo, real), _up(tree.hi, real)
+    edges = np.abs(item.vertices[:, [1, 2, 0]] - item.vertices).sum(2)
+    reach = np.maximum(np.abs(tree.lo), np.abs(tree.hi)).sum() + edges.max(initial=0.0)
+    record["extent"] = _up(np.asarray(reach), real)
+    record["root"] = root
+    return record
+
+
+def _down(values: FloatArray, real: type[np.floating]) -> NDArray[Any]:
+    rounded = values.astype(real)
+    return np.where(rounded > values, np.nextafter(rounded, real(-np.inf)), rounded)
+
+
+def _up(values: FloatArray, real: type[np.floating]) -> NDArray[Any]:
+    return -_down(-values, real)
+
+
+def _surfaces(scene: Scene, orders: Sequence[NDArray[np.int64]], vertices: FloatArray, real: type[np.floating]) -> NDArray[np.void]:
+    records = np.zeros(len(vertices), layout.surface(real))
+    records["geometric"] = unit_normals(vertices)
+    first = 0
+    for number, (item, order) in enumerate(zip(scene.objects, orders, strict=True)):
+        part = records[first : first + len(order)]
+        part["normal"], part["material"], part["object"] = item.normals[order], item.material_ids[order], number
+        first += len(order)
+    return records
+
+
+def _materials(scene: Scene, features: Features, precision: Precision) -> NDArray[np.void]:
+    dtype = material_dtype(features, precision)
+    records = np.zeros(len(scene.materials), dtype)
+    for i, material in enumerate(scene.materials):
+        for member in dtype.names or ():
+            records[member][i] = getattr(material, member)
+    return records
+
+
+def _frame(
+    scene: Scene, origin: FloatArray, objects: NDArray[np.void], slots: int, features: Features, precision: Precision
+) -> NDArray[np.void]:
+    camera = scene.camera
+    ul, ur, ll, lr = camera.corners / np.abs(camera.corners).max()
+    record = np.zeros(1, frame_dtype(features, precision))
+    values = {
+        "eye": camera.eye, "local_origin": origin, "eye_local": camera.eye - origin, "corner": ul, "along_row": ur - ul,
+        "along_column": ll - ul, "twist": ul - ur - ll + lr, "background": scene.background,
+        "extent": objects["extent"].max(initial=0.0), "width": camera.width, "height": camera.height,
+        "object_count": len(objects), "triangle_slots": slots,
+    }  # fmt: skip
+    values |= {name: value(scene) for f in features.active for name, _, value in f.frame}
+    for name, value in values.items():
+        record[name] = value
+    return record
+
+
+def _lights(packed: Packed) -> NDArray[np.void]:
+    records = np.zeros(len(packed.scene.lights), layout.light(packed.real))
+    for i, light in enumerate(packed.scene.lights):
+        records["given"][i], records["color"][i] = light.position, light.color
+        records["position"][i] = np.asarray(light.position) - packed.origin
+    return records
+
+
+def _spheres(packed: Packed) -> NDArray[np.void]:
+    spheres = packed.scene.spheres
+    records = np.zeros(len(spheres), layout.sphere(packed.real))
+    records["center"], records["radius"] = spheres.centers - packed.origin, spheres.radii
+    records["material"] = spheres.material_ids
+    return records
+
+
+def _corner_normals(packed: Packed) -> NDArray[Any]:
+    """(s, 3, 3): the normals at the corners; an object without any has its face normals there."""
+    parts = []
+    for item, order in zip(packed.scene.objects, packed.orders, strict=True):
+        corners = item.vertex_normals if item.vertex_normals is not None else np.repeat(item.normals[:, None], 3, 1)
+        parts.append(corners[order].astype(packed.real))
+    return np.concatenate(parts)
+
+
+_PACKERS: dict[str, Callable[[Packed], NDArray[Any]]] = {"lights": _lights, "spheres": _spheres, "corner_normals": _corner_normals}

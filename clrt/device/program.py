@@ -1,0 +1,204 @@
+"""From Features and Precision to one OpenCL program: kernel files in an ordered list, nothing that is not called for.
+
+Kernel files carry three kinds of marks, all C comments:
+
+    //@ place                a place where effects add code
+    //@hook place ... //@end at the end of an effect's file: the code it adds at `place`
+    //@counting code         a line of the counting build alone
+
+Every chunk of the composed text starts with `#line 1 "name.cl"`, so that a compiler's message names the file to open.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from clrt.device import layout
+from clrt.device.context import Device
+from clrt.errors import DeviceError, LimitError
+from clrt.features import REAL, Features
+from clrt.precision import Precision
+
+_BEFORE = ("rays.cl", "geometry.cl", "triangle.cl", "{triangle}", "box.cl", "kdtree.cl", "hit.cl")
+_BETWEEN = ("scene.cl", "surface.cl")
+_AFTER = ("camera.cl", "prepare.cl", "render.cl")
+PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a packet, width and height
+LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
+PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
+MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
+#: what stands at a place where no effect adds anything
+_DEFAULTS = {"trace": "        scene_trace(&geometry, &rays, 1, 0, &hits);", "next": "        break;"}
+_PLACE = re.compile(r"^[ \t]*//@ (\w+)[ \t]*$", re.M)
+_HOOK = re.compile(r"^//@hook (\w+)\n(.*?)^//@end[ \t]*\n?", re.M | re.S)
+_COUNTING = re.compile(r"^([ \t]*)//@counting (.*)\n", re.M)
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The sizes a program is compiled for.
+
+    stack : entries of the traversal stack, at least the depth of the deepest tree
+    depth : greatest number of bounces
+    shared_lights : whether edge planes as seen from the lights are at hand
+    """
+
+    stack: int
+    depth: int = 0
+    shared_lights: bool = True
+
+
+def stack_size(tree_depth: int) -> int:
+    """Stack entries for trees of this depth: rounded up to a multiple of 8, so that few programs serve all scenes."""
+    return max(8, -(-(tree_depth + 1) // 8) * 8)
+
+
+@cache
+def kernel_folder() -> Any:
+    """Where the kernel files are: inside the installed package, or at the top of a checkout."""
+    inside = resources.files("clrt") / "kernels"
+    return inside if inside.is_dir() else Path(__file__).resolve().parents[2] / "kernels"
+
+
+@cache
+def kernel_source(name: str) -> tuple[str, tuple[tuple[str, str, int], ...]]:
+    """A kernel file without its hooks, and its hooks: (place, code, line number)."""
+    text = (kernel_folder() / name).read_text(encoding="utf-8")
+    hooks = tuple((m[1], m[2], text.count("\n", 0, m.start()) + 2) for m in _HOOK.finditer(text))
+    return _HOOK.sub("", text).rstrip("\n") + "\n", hooks
+
+
+def _structs(features: Features, precision: Precision) -> str:
+    real = precision.real
+    names = [("Triangle", layout.triangle(real)), ("EdgePlanes", layout.edge_planes(real)), ("Object", layout.object_record(real)),
+             ("Surface", layout.surface(real)), ("Material", material_dtype(features, precision)), ("Frame", frame_dtype(features, precision))]  # fmt: skip
+    declared = " ".join(declaration for f in features.active for _, declaration in f.parameters)
+    names += [(name, make(real)) for name, make in (("Light", layout.light), ("Sphere", layout.sphere)) if f" {name} " in declared]
+    return "".join(layout.c_struct(name, dtype) for name, dtype in names)
+
+
+def material_dtype(features: Features, precision: Precision) -> np.dtype[np.void]:
+    return layout.material(precision.real, [(n, precision.real if t is REAL else t) for f in features.active for n, t in f.material])
+
+
+def frame_dtype(features: Features, precision: Precision) -> np.dtype[np.void]:
+    return layout.frame(precision.real, [(n, precision.real if t is REAL else t) for f in features.active for n, t, _ in f.frame])
+
+
+def _defines(features: Features, precision: Precision, lanes: int, shape: Shape, counting: bool) -> str:
+    width, height = PACKETS[lanes]
+    values: dict[str, int] = {"REAL_BITS": precision.bits, "LANES": lanes, "PACKET_WIDTH": width, "PACKET_HEIGHT": height,
+                              "STACK_SIZE": shape.stack}  # fmt: skip
+    names = {f.name for f in features.active}
+    if "shadows" in names:
+        values["SHADOW_SHARED_ORIGIN"] = int(shape.shared_lights)
+    if "bounce" in names:
+        values["BOUNCE_STACK"] = shape.depth + 2
+    if "refraction" in names:
+        values["MEDIA_DEPTH"] = MEDIA_DEPTH
+    if counting:
+        values |= {f"COUNT_{kind.upper()}": i for i, kind in enumerate(features.ray_kinds)}
+        values["COUNT_TESTS"] = len(features.ray_kinds)
+    return "".join(f"#define {name} {value}\n" for name, value in values.items())
+
+
+def _insert(name: str, text: str, hooks: dict[str, list[tuple[str, str, int]]]) -> str:
+    """`text` of the file `name` with the code of all hooks in their places; line directives keep messages true."""
+    out: list[str] = []
+    for number, line in enumerate(text.splitlines(), 1):
+        place = _PLACE.match(line)
+        if not place:
+            out.append(line)
+            continue
+        found = hooks.get(place[1], [])
+        for file, code, first in found:
+            out += [f'#line {first} "{file}"', _insert(file, code, hooks).rstrip("\n")]
+        if not found and place[1] in _DEFAULTS:
+            out.append(_DEFAULTS[place[1]])
+        if found or place[1] not in _DEFAULTS:
+            out.append(f'#line {number + 1} "{name}"')
+    return "\n".join(out) + "\n"
+
+
+def _files(features: Features, precision: Precision, counting: bool) -> Iterator[str]:
+    yield from (name.format(triangle=precision.kernel) for name in _BEFORE)
+    yield from (f.kernel for f in features.active if f.early)
+    yield from _BETWEEN
+    yield from (f.kernel for f in features.active if not f.early)
+    yield from _AFTER
+
+
+def compose(features: Features, precision: Precision, lanes: int, shape: Shape, *, counting: bool = False) -> str:
+    """The whole source of the program for these features: a pure function of its arguments and the kernel files."""
+    files = list(_files(features, precision, counting))
+    if counting:
+        files.insert(0, "count.cl")
+    hooks: dict[str, list[tuple[str, str, int]]] = {
+        "parameters": [("features", f"                   , {c}\n", 1) for f in features.active for _, c in f.parameters]
+    }
+    for name in files:
+        for place, code, line in kernel_source(name)[1]:
+            hooks.setdefault(place, []).append((name, code, line))
+    chunks = [_defines(features, precision, lanes, shape, counting), f'#line 1 "lanes.cl"\n{kernel_source("lanes.cl")[0]}']
+    chunks.append(f'#line 1 "structs"\n{_structs(features, precision)}')
+    for name in files:
+        chunks.append(f'#line 1 "{name}"\n' + _insert(name, kernel_source(name)[0], hooks))
+    return _COUNTING.sub(r"\1\2\n" if counting else "\n", "".join(chunks))
+
+
+def private_bytes(precision: Precision, lanes: int, shape: Shape, features: Features) -> int:
+    """An upper estimate of the private memory of one work-item, in bytes: its stacks, twice over for inlined copies, and 16 KiB."""
+    lane_bytes = lanes * precision.bits // 8
+    names = {f.name for f in features.active}
+    entry = lane_bytes * (9 + (2 * MEDIA_DEPTH + 1 if "refraction" in names else 0)) + 64
+    traversal = shape.stack * (2 * lane_bytes + 4) * 3
+    return traversal + (entry * (shape.depth + 4) if "bounce" in names else 0) + (16 << 10)
+
+
+def check_limits(precision: Precision, lanes: int, shape: Shape, features: Features) -> None:
+    """Raises LimitError where a work-group's private memory would not fit a thread's stack, on which PoCL keeps it."""
+    need = private_bytes(precision, lanes, shape, features) * LOCAL_SIZE[0] * LOCAL_SIZE[1]
+    if need > PRIVATE_LIMIT:
+        raise LimitError(
+            f"a ray depth of {shape.depth} with trees of depth {shape.stack} needs {need >> 20} MiB of private memory, "
+            f"more than the {PRIVATE_LIMIT >> 20} MiB that a device thread holds; lower --depth"
+        )
+
+
+OPTIONS = ("-cl-std=CL1.2",)
+_UNSAFE = ("fast-relaxed-math", "unsafe-math", "finite-math", "ffast-math", "no-signed-zeros", "mad-enable")
+
+
+def check_options(options: tuple[str, ...]) -> None:
+    """Refuses build options that break NaN tests and error bounds. Raises DeviceError."""
+    for option in options:
+        if any(word in option for word in _UNSAFE):
+            raise DeviceError(f"the build option '{option}' breaks the error bounds that the pictures rest on; leave it out")
+
+
+def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> Any:
+    """Compiles `source` on `device`; a pyopencl Program.
+
+    PoCL keeps its own cache of compiled kernels; a process that was killed can leave a broken entry there, so a build that
+    fails is tried once more from a text the cache does not know. Raises DeviceError with the compiler's message.
+    """
+    import pyopencl as cl
+
+    check_options(options)
+    error: Exception | None = None
+    for text in (source, source + "\n// built again, past the cache\n"):
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", cl.CompilerWarning)
+                return cl.Program(device.context, text).build(options=list(options))
+        except cl.Error as failure:
+            error = failure
+    raise DeviceError(f"the device '{device.info.name}' could not compile the program: {error}") from error

@@ -1,0 +1,134 @@
+"""A scene on a device: buffers filled, records prepared, one program ready to launch over bands of rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.device import layout, program
+from clrt.device.context import Device
+from clrt.device.pack import Packed
+from clrt.errors import LimitError
+from clrt.features import Features
+from clrt.precision import Precision
+
+_PREPARE_LOCAL = 64
+
+
+class Buffers:
+    """The device's copy of a packed scene. `shared_lights`: whether edge planes of every light fit in memory."""
+
+    def __init__(self, device: Device, packed: Packed, features: Features, precision: Precision) -> None:
+        self.device, self.packed, self.features, self.precision = device, packed, features, precision
+        self.plane_bytes = max(1, packed.slots) * layout.edge_planes(precision.real).itemsize
+        lights = len(packed.scene.lights)
+        self.shared_lights = self.plane_bytes * lights <= min(device.handle.max_mem_alloc_size, device.handle.global_mem_size // 4)
+        self._check_memory()
+        self.frame = self.upload(packed.frame)
+        self.vertices = self.upload(packed.vertices)
+        self.core = [self.upload(a) for a in (packed.nodes, packed.indices, packed.objects, packed.surfaces, packed.materials)]
+        self.effects = {
+            name: self.upload(packed.argument(name)) for f in features.active for name, _ in f.parameters if name != "light_planes"
+        }
+        self.triangles = self.empty(max(1, packed.slots) * layout.triangle(precision.real).itemsize)
+        self.eye_planes = self.empty(self.plane_bytes)
+        with_shadows = any(name == "light_planes" for f in features.active for name, _ in f.parameters)
+        if with_shadows:
+            self.effects["light_planes"] = self.empty(self.plane_bytes * (lights if self.shared_lights else 1))
+
+    def _check_memory(self) -> None:
+        need, there = self.plane_bytes * 4, self.device.handle.global_mem_size
+        if need > there:
+            raise LimitError(f"{self.packed.slots:,} triangles need {need >> 20:,} MiB on the device, which has {there >> 20:,} MiB")
+
+    def upload(self, array: NDArray[Any]) -> Any:
+        import pyopencl as cl
+
+        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+        contents = np.ascontiguousarray(array) if array.size else np.zeros(1, array.dtype)
+        return cl.Buffer(self.device.context, flags, hostbuf=contents)
+
+    def empty(self, size: int) -> Any:
+        import pyopencl as cl
+
+        return cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, size)
+
+    def prepare(self, built: Any) -> None:
+        """Computes the records that rays test, on the device, from the vertices as given."""
+        import pyopencl as cl
+
+        packed, queue, count = self.packed, self.device.queue, np.int32(self.packed.slots)
+        if not packed.slots:
+            return
+        size = (-(-packed.slots // _PREPARE_LOCAL) * _PREPARE_LOCAL,)
+        origin = _double4(packed.origin)
+        cl.Kernel(built, "prepare_triangles")(queue, size, (_PREPARE_LOCAL,), self.vertices, origin, self.triangles, count)
+        planes = cl.Kernel(built, "prepare_planes")
+        local = (_PREPARE_LOCAL,)
+        planes(queue, size, local, self.vertices, _double4(packed.scene.camera.eye), self.eye_planes, np.int32(0), count)
+        if "light_planes" in self.effects and self.shared_lights:
+            for i, light in enumerate(packed.scene.lights):
+                first = np.int32(i * packed.slots)
+                planes(queue, size, local, self.vertices, _double4(np.asarray(light.position)), self.effects["light_planes"], first, count)
+        queue.finish()
+
+
+def _double4(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.array([*values, 0.0])
+
+
+class Tracer:
+    """A built program with the buffers it reads; `run` renders rows of the film."""
+
+    def __init__(self, buffers: Buffers, built: Any, *, counting: bool = False) -> None:
+        import pyopencl as cl
+
+        scene = buffers.packed.scene
+        self.buffers, self.counting = buffers, counting
+        self.width, self.height = scene.camera.width, scene.camera.height
+        self.lanes = buffers.precision.lanes(buffers.device.info.lanes)
+        self.film = buffers.empty(self.width * self.height * 12)
+        self.kernel = cl.Kernel(built, "render")
+        self.counters = np.zeros(len(buffers.features.ray_kinds) + len(scene.objects), np.uint32)
+        self.counts = np.zeros(len(self.counters), np.int64)
+        self._counter_buffer = buffers.empty(self.counters.nbytes) if counting else None
+        nodes, indices, objects, surfaces, materials = buffers.core
+        self._before = (buffers.frame, nodes, indices, buffers.triangles, buffers.eye_planes, buffers.vertices, objects, surfaces, materials)
+        self._after = (self.film, *(buffers.effects[name] for f in buffers.features.active for name, _ in f.parameters))
+        if counting:
+            self._after += (self._counter_buffer,)
+
+    def warm_up(self) -> None:
+        """Launches over no rows: PoCL compiles for a local size at its first launch, which belongs to compiling."""
+        self.run(0, 0)
+
+    def run(self, first_row: int, end_row: int) -> None:
+        """Renders rows [first_row, end_row) and waits for them. In the counting build, adds to `counts`."""
+        import pyopencl as cl
+
+        packet_width, packet_height = program.PACKETS[self.lanes]
+        columns = _multiple(-(-self.width // packet_width), program.LOCAL_SIZE[0])
+        rows = _multiple(max(1, -(-(end_row - first_row) // packet_height)), program.LOCAL_SIZE[1])
+        queue = self.buffers.device.queue
+        if self.counting:
+            self.counters[:] = 0
+            cl.enqueue_copy(queue, self._counter_buffer, self.counters)
+        self.kernel(queue, (columns, rows), program.LOCAL_SIZE, *self._before, np.int32(first_row), np.int32(end_row), *self._after)
+        queue.finish()
+        if self.counting:
+            cl.enqueue_copy(queue, self.counters, self._counter_buffer)
+            self.counts += self.counters
+
+    def picture(self) -> NDArray[np.float32]:
+        """(height, width, 3) float32, linear."""
+        import pyopencl as cl
+
+        pixels = np.empty((self.height, self.width, 3), np.float32)
+        cl.enqueue_copy(self.buffers.device.queue, pixels, self.film)
+        return pixels
+
+
+def _multiple(value: int, of: int) -> int:
+    return -(-value // of) * of

@@ -1,0 +1,182 @@
+"""From a checked scene to a picture: trees, buffers, program, bands of rows."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from clrt.device import program
+from clrt.device.context import Device, open_device
+from clrt.device.pack import local_origin, pack
+from clrt.device.session import Buffers, Tracer
+from clrt.errors import ClrtError, LimitError
+from clrt.features import Features
+from clrt.files import atomic_write
+from clrt.image.image import Image
+from clrt.kdtree import build_tree
+from clrt.kdtree.tree import KdTree
+from clrt.precision import DEFAULT, Precision, rung
+from clrt.scene.model import Scene
+from clrt.stats import ObjectStats, RunStats
+
+Progress = Callable[[str, float], None]
+
+MAX_PIXELS = 1 << 28
+MAX_DEPTH = 64
+_LAUNCH_S = 0.15  #: a launch is to take about this long, so that Ctrl-C and progress come between launches
+_FIRST_LAUNCH = 1 << 20  #: rays at most, by a rough count, in the first launch, whose speed is not known yet
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A scene with its trees, ready for any number of renders. `tree_s`: seconds of each tree."""
+
+    scene: Scene
+    trees: tuple[KdTree, ...]
+    tree_s: tuple[float, ...]
+
+
+def render(
+    scene: Scene,
+    *,
+    size: tuple[int, int] | None = None,
+    tree: str = "sah",
+    device: str | None = None,
+    precision: str = DEFAULT,
+    depth: int | None = None,
+    count: bool = False,
+    progress: Progress | None = None,
+    dump_kernel: Path | None = None,
+) -> Image:
+    """The picture of `scene`, with the figures of the run in its `stats`.
+
+    size : (width, height) in pixels; depth : reflections and refractions in a row, 0 to 64; count : run a second, counting pass
+    dump_kernel : where to write the OpenCL program. Raises DeviceError, LimitError, ClrtError, OSError.
+    """
+    start = time.perf_counter()
+    tell = progress or (lambda phase, fraction: None)
+    scene = _with_options(scene, size, depth)
+    ladder, opened = rung(precision), open_device(device)
+    features = Features.of(scene)
+    prepared = build_trees(scene, tree, tell)
+    build_end = time.perf_counter()
+    buffers, tracer, source, upload_s = _open(prepared, features, ladder, opened, tell)
+    compile_s = time.perf_counter() - build_end - upload_s
+    if dump_kernel is not None:
+        with atomic_write(dump_kernel) as file:
+            file.write(source.encode())
+    before = time.perf_counter()
+    _run(tracer, "render", tell)
+    pixels = tracer.picture()
+    end = time.perf_counter()
+    stats = RunStats(
+        scene=scene.source, width=scene.camera.width, height=scene.camera.height, tree=tree, device=opened.info.name,
+        precision=precision, effects=list(features.effects), objects=_object_stats(prepared), build_s=sum(prepared.tree_s),
+        upload_s=upload_s, compile_s=compile_s, render_s=end - before, total_s=end - start,
+    )  # fmt: skip
+    if count:
+        _count(buffers, stats, tell)
+        stats.count_s = time.perf_counter() - end
+    return Image(pixels, stats)
+
+
+def _with_options(scene: Scene, size: tuple[int, int] | None, depth: int | None) -> Scene:
+    if size is not None:
+        scene = scene.with_size(*size)
+    if depth is not None:
+        scene = replace(scene, depth=depth)
+    if not 0 <= scene.depth <= MAX_DEPTH:
+        raise LimitError(f"a depth of {scene.depth} is out of range; it goes from 0 to {MAX_DEPTH}")
+    width, height = scene.camera.width, scene.camera.height
+    if width < 1 or height < 1 or width * height > MAX_PIXELS:
+        raise LimitError(f"a picture of {width} x {height} is out of range; it has 1 to {MAX_PIXELS:,} pixels")
+    if not scene.triangle_count and not len(scene.spheres):
+        raise ClrtError("the scene has nothing to render; add a triangle or a sphere")
+    return scene
+
+
+def build_trees(scene: Scene, tree: str, tell: Progress) -> Prepared:
+    """A kd-tree an object, over coordinates relative to the scene's local origin."""
+    origin, trees, seconds = local_origin(scene), [], []
+    total, done = max(1, scene.triangle_count), 0
+    for item in scene.objects:
+        tell("trees", done / total)
+        share = len(item) / total
+        start = time.perf_counter()
+        trees.append(build_tree(item.vertices - origin, tree, progress=lambda f, d=done / total, s=share: tell("trees", d + s * f)))
+        seconds.append(time.perf_counter() - start)
+        done += len(item)
+    return Prepared(scene, tuple(trees), tuple(seconds))
+
+
+def _shape(prepared: Prepared, features: Features, shared_lights: bool) -> program.Shape:
+    deepest = max((t.depth for t in prepared.trees), default=0)
+    bounces = any(f.name == "bounce" for f in features.active)
+    return program.Shape(program.stack_size(deepest), prepared.scene.depth if bounces else 0, shared_lights)
+
+
+def _open(
+    prepared: Prepared, features: Features, precision: Precision, device: Device, tell: Progress
+) -> tuple[Buffers, Tracer, str, float]:
+    """Buffers filled and program built; also its source, and the seconds of packing, upload and preparing."""
+    tell("compile", 0.0)
+    lanes = precision.lanes(device.info.lanes)
+    program.check_limits(precision, lanes, _shape(prepared, features, True), features)
+    start = time.perf_counter()
+    buffers = Buffers(device, pack(prepared.scene, prepared.trees, features, precision), features, precision)
+    upload_s = time.perf_counter() - start
+    source = program.compose(features, precision, lanes, _shape(prepared, features, buffers.shared_lights))
+    built = program.build(device, source)
+    tracer = Tracer(buffers, built)
+    tracer.warm_up()
+    tell("compile", 1.0)
+    start = time.perf_counter()
+    buffers.prepare(built)
+    return buffers, tracer, source, upload_s + time.perf_counter() - start
+
+
+def _run(tracer: Tracer, phase: str, tell: Progress) -> None:
+    """All rows, in launches of about _LAUNCH_S each; Python sees signals between them."""
+    scene = tracer.buffers.packed.scene
+    bounces = any(f.name == "bounce" for f in tracer.buffers.features.active)
+    rays_a_pixel = (1 + len(scene.lights)) * (1 + (2 * scene.depth if bounces else 0))
+    rows = max(8, _FIRST_LAUNCH // (rays_a_pixel * tracer.width))
+    row = 0
+    while row < tracer.height:
+        tell(phase, row / tracer.height)
+        end = min(tracer.height, row + rows)
+        start = time.perf_counter()
+        tracer.run(row, end)
+        pace = (time.perf_counter() - start) / (end - row)
+        rows = max(8, min(8 * rows, int(_LAUNCH_S / max(pace, 1e-9)))) // 8 * 8
+        row = end
+    tell(phase, 1.0)
+
+
+def _object_stats(prepared: Prepared) -> list[ObjectStats]:
+    return [
+        ObjectStats(
+            name=item.name, triangles=len(item), nodes=len(tree.split_axis), leaves=int(np.count_nonzero(tree.split_axis == 3)),
+            references=len(tree.indices), depth=tree.depth, build_s=seconds,
+        )
+        for item, tree, seconds in zip(prepared.scene.objects, prepared.trees, prepared.tree_s, strict=True)
+    ]  # fmt: skip
+
+
+def _count(buffers: Buffers, stats: RunStats, tell: Progress) -> None:
+    """The same picture again by the counting build: rays by kind, tests by object."""
+    precision, device = buffers.precision, buffers.device
+    lanes = precision.lanes(device.info.lanes)
+    bounces = any(f.name == "bounce" for f in buffers.features.active)
+    shape = program.Shape(program.stack_size(stats.depth), buffers.packed.scene.depth if bounces else 0, buffers.shared_lights)
+    tracer = Tracer(buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True)
+    _run(tracer, "count", tell)
+    kinds = buffers.features.ray_kinds
+    stats.ray_counts = {kind: int(n) for kind, n in zip(kinds, tracer.counts, strict=False)}
+    rays = max(1, sum(stats.ray_counts.values()))
+    for item, tests in zip(stats.objects, tracer.counts[len(kinds) :], strict=True):
+        item.tests_per_ray = int(tests) / rays

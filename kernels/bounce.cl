@@ -1,0 +1,83 @@
+// Provides: Bounce: rays that go on from a hit, waiting on a stack; bounce_*.
+// Needs: rays.cl, hit.cl, structs.  Reads: BOUNCE_STACK (greatest depth + 2).
+//
+// Depth first: a packet puts at most two packets on the stack and takes one off, so the stack holds at most depth + 1 and one to spare.
+typedef struct {
+    real_n origin[3], direction[3], weight;
+    mask_n skip, active;
+    int depth_left;
+    //@ bounce_members
+} Bounce;
+
+typedef struct {
+    Bounce entry[BOUNCE_STACK];
+    int count;
+} BounceStack;
+
+// Puts `direction` from the hit point on the stack for the lanes in `active`, starting on the side that it points to; gives its place there.
+inline Bounce *bounce_push(BounceStack *stack, const Hit *hit, const real_n *direction, real_n weight, mask_n active, const Bounce *from) {
+    Bounce *next = stack->entry + stack->count;
+    if (!any_lane(active)) return next;
+    stack->count++;
+    *next = *from;
+    real_n away[3] = {hit->geometric[0], hit->geometric[1], hit->geometric[2]};
+    face_towards(away, direction, 0);
+    for (int a = 0; a < 3; a++) {
+        next->origin[a] = choose(active, multiply_add(away[a], hit->error, hit->point[a]), (real_n)0);
+        next->direction[a] = choose(active, direction[a], (real_n)1);
+    }
+    next->weight = weight;
+    next->skip = load_lanes(hit->slot);
+    next->active = active;
+    next->depth_left = from->depth_left - 1;
+    return next;
+}
+
+// Takes the next packet off the stack; 0 where none waits.
+inline int bounce_pop(BounceStack *stack, Bounce *current, Rays *rays) {
+    if (stack->count == 0) return 0;
+    *current = stack->entry[--stack->count];
+    for (int a = 0; a < 3; a++) {
+        rays->origin[a] = current->origin[a];
+        rays->direction[a] = current->direction[a];
+    }
+    rays->t_min = (real_n)0;
+    rays->skip = current->skip;
+    rays->active = current->active;
+    rays_prepare(rays);
+    return 1;
+}
+
+// The reflected direction: about the shading normal, or about the true one where that would lead below the surface.
+inline void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
+    const real_n twice = R(2.0) * dot_n(rays->direction, hit->normal), true_twice = R(2.0) * dot_n(rays->direction, hit->geometric);
+    for (int a = 0; a < 3; a++) direction[a] = rays->direction[a] - twice * hit->normal[a];
+    const mask_n below = is_at_most(dot_n(direction, hit->geometric), (real_n)0);
+    for (int a = 0; a < 3; a++) direction[a] = choose(below, rays->direction[a] - true_twice * hit->geometric[a], direction[a]);
+    normalize_n(direction);
+}
+
+//@hook begin
+    BounceStack bounces;
+    Bounce current;
+    bounces.count = 0;
+    current.depth_left = frame->depth;
+//@end
+//@hook trace
+        // The eye's rays share their origin; those that go on do not.
+        if (current.depth_left == frame->depth) scene_trace(&geometry, &rays, 1, 0, &hits);
+        else scene_trace(&geometry, &rays, 0, 0, &hits);
+//@end
+//@hook spawn
+        if (current.depth_left > 0) {
+            real_n reflected = (real_n)0;
+            //@ bounce_weights
+            real_n direction[3];
+            bounce_reflected(&rays, &hit, direction);
+            bounce_push(&bounces, &hit, direction, weight * reflected, is_greater(weight * reflected, (real_n)0), &current);
+        }
+//@end
+//@hook next
+        if (!bounce_pop(&bounces, &current, &rays)) break;
+        weight = current.weight;
+//@end

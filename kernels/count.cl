@@ -1,0 +1,32 @@
+// Provides: counters of rays by kind and of ray-triangle tests by object, for the counting build alone.
+// Needs: lanes.cl.  Reads: COUNT_* (the place of each kind), COUNT_TESTS (that of object 0).
+inline void count_rays(volatile global uint *counters, int kind, mask_n lanes) {
+    const int n = count_lanes(lanes);
+    if (n > 0) atomic_add(counters + kind, (uint)n);
+}
+
+//@hook parameters
+                   , volatile global uint *counters
+//@end
+//@hook geometry_members
+    volatile global uint *counters;
+//@end
+//@hook hits_members
+    int tests;
+//@end
+//@hook begin
+    geometry.counters = counters;
+//@end
+//@hook hits_begin
+    hits.tests = 0;
+//@end
+//@hook count_tests
+            hits->tests += count_lanes(live) * (end - first);
+//@end
+//@hook count_object
+        if (hits->tests > 0) atomic_add(geometry->counters + COUNT_TESTS + b, (uint)hits->tests);
+        hits->tests = 0;
+//@end
+//@hook primary
+    count_rays(counters, COUNT_PRIMARY, rays.active);
+//@end

@@ -1,0 +1,14 @@
+// Provides: Geometry, what a ray can meet, by pointer.
+// Needs: structs.  Reads: nothing.
+typedef struct {
+    global const int2 *nodes;            // inner: (bits of the split, child << 2 | axis); leaf: (first index, count << 2 | 3)
+    global const int *indices;           // triangle slots, leaf by leaf
+    global const Triangle *triangles;    // a slot each, relative to the local origin, for rays of any origin
+    global const EdgePlanes *planes;     // a slot each, seen from the shared origin
+    global const double *vertices;       // 9 a slot: the numbers as given
+    global const Object *objects;
+    int object_count, slot_count;        // objects; triangle slots of the scene
+    double shared_origin[3];             // as given
+    double local_origin[3];
+    //@ geometry_members
+} Geometry;

@@ -1,0 +1,34 @@
+// Provides: Hit: what shading needs to know of the nearest hit of each ray; gather, normalize_n, face_towards, hit_outside.
+// Needs: lanes.cl, rays.cl.  Reads: nothing.
+
+// Lane-wise reads: `expression` may use the lane number k.
+#define gather(result, expression)                                \
+    {                                                             \
+        real lane_[LANES];                                        \
+        for (int k = 0; k < LANES; k++) lane_[k] = (expression);  \
+        result = load_lanes(lane_);                               \
+    }
+
+typedef struct {
+    real_n point[3];      // on the surface to within `error`
+    real_n geometric[3];  // unit normal of the surface itself, towards the viewer
+    real_n normal[3];     // unit normal for shading, on the same side
+    real_n error;         // bounds the distance from `point` to the surface along the normal, in scene units
+    mask_n found;
+    lane_int slot[LANES];      // what was hit; 0 in lanes that hit nothing
+    lane_int material[LANES];
+} Hit;
+
+inline void normalize_n(real_n *a) {
+    const real_n scale = R(1.0) / sqrt(dot_n(a, a));
+    for (int i = 0; i < 3; i++) a[i] *= scale;
+}
+
+// Turns `a` to the side of `b`.
+inline void face_towards(real_n *a, const real_n *b, const int away) {
+    const mask_n flip = away ? is_greater(dot_n(a, b), (real_n)0) : is_less(dot_n(a, b), (real_n)0);
+    for (int i = 0; i < 3; i++) a[i] = choose(flip, -a[i], a[i]);
+}
+
+// The hit point moved towards the viewer by `distance`, far enough that no rounding puts it behind.
+inline real_n hit_outside(const Hit *hit, real_n distance, int axis) { return multiply_add(hit->geometric[axis], distance, hit->point[axis]); }

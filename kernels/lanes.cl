@@ -1,0 +1,117 @@
+// Provides: real, real_n, mask_n (LANES rays side by side), R(), choose, min_n, max_n, abs_n, any_lane, comparisons, dot_n, lane access.
+// Needs: nothing.  Reads: LANES (16, 8, 4 or 1), REAL_BITS (32 or 64).
+//
+// Out-of-line vector built-ins (select, any, fmin...) go through memory on PoCL; everything here compiles to plain vector instructions.
+#pragma OPENCL FP_CONTRACT OFF
+#define PASTE_(a, b) a##b
+#define PASTE(a, b) PASTE_(a, b)
+
+#if REAL_BITS == 64
+#pragma OPENCL EXTENSION cl_khr_fp64 : enable
+typedef double real;
+typedef long lane_int;
+#define R(x) x
+#define REAL_NAME double
+#define LANE_INT_NAME long
+#define UNIT_ROUNDOFF 0x1p-53
+#define TINY_COMPONENT 0x1p-500
+#define HUGE_INVERSE 0x1p500
+#define REAL_MAX DBL_MAX
+#else
+typedef float real;
+typedef int lane_int;
+#define R(x) x##f
+#define REAL_NAME float
+#define LANE_INT_NAME int
+#define UNIT_ROUNDOFF 0x1p-24f
+#define TINY_COMPONENT 0x1p-90f
+#define HUGE_INVERSE 0x1p90f
+#define REAL_MAX FLT_MAX
+#endif
+
+#if LANES == 1
+typedef real real_n;
+typedef lane_int mask_n;
+// A scalar comparison gives 1, a vector one -1 a lane; masks here are always 0 or -1.
+#define is_less(a, b) ((mask_n) - ((a) < (b)))
+#define is_at_most(a, b) ((mask_n) - ((a) <= (b)))
+#define is_equal(a, b) ((mask_n) - ((a) == (b)))
+#define to_real_n(x) ((real_n)(x))
+#else
+typedef PASTE(REAL_NAME, LANES) real_n;
+typedef PASTE(LANE_INT_NAME, LANES) mask_n;
+#define is_less(a, b) ((a) < (b))
+#define is_at_most(a, b) ((a) <= (b))
+#define is_equal(a, b) ((a) == (b))
+#define to_real_n(x) PASTE(PASTE(convert_, REAL_NAME), LANES)(x)
+#endif
+#define is_greater(a, b) is_less(b, a)
+#define is_at_least(a, b) is_at_most(b, a)
+
+#define ALL_LANES ((mask_n)(-1))
+#define NO_LANES ((mask_n)(0))
+#define choose(m, a, b) ((m) ? (a) : (b))
+
+inline real_n min_n(real_n a, real_n b) { return choose(is_less(a, b), a, b); }
+inline real_n max_n(real_n a, real_n b) { return choose(is_greater(a, b), a, b); }
+inline real_n abs_n(real_n a) { return choose(is_less(a, (real_n)0), -a, a); }
+
+// One mask test where the instruction set has it, a halving reduction elsewhere.
+#if LANES == 16 && REAL_BITS == 32 && defined(__AVX512DQ__) && defined(__clang__)
+#define any_lane(m) (__builtin_ia32_cvtd2mask512(m) != 0)
+#elif LANES == 8 && REAL_BITS == 64 && defined(__AVX512DQ__) && defined(__clang__)
+typedef long long vector_8_long_long __attribute__((ext_vector_type(8)));
+#define any_lane(m) (__builtin_ia32_cvtq2mask512(__builtin_astype(m, vector_8_long_long)) != 0)
+#elif LANES == 16
+inline int any_lane(mask_n m) {
+    const PASTE(LANE_INT_NAME, 8) a = m.lo | m.hi;
+    const PASTE(LANE_INT_NAME, 4) b = a.lo | a.hi;
+    const PASTE(LANE_INT_NAME, 2) c = b.lo | b.hi;
+    return (c.x | c.y) != 0;
+}
+#elif LANES == 8
+inline int any_lane(mask_n m) {
+    const PASTE(LANE_INT_NAME, 4) b = m.lo | m.hi;
+    const PASTE(LANE_INT_NAME, 2) c = b.lo | b.hi;
+    return (c.x | c.y) != 0;
+}
+#elif LANES == 4
+inline int any_lane(mask_n m) {
+    const PASTE(LANE_INT_NAME, 2) c = m.lo | m.hi;
+    return (c.x | c.y) != 0;
+}
+#else
+#define any_lane(m) ((m) != 0)
+#endif
+
+// Lanes through memory, for the rare scalar work on each.
+#if LANES == 1
+#define load_lanes(p) (*(p))
+#define store_lanes(v, p) (*(p) = (v))
+#else
+#define load_lanes(p) PASTE(vload, LANES)(0, p)
+#define store_lanes(v, p) PASTE(vstore, LANES)(v, 0, p)
+#endif
+
+// The number of lanes set.
+inline int count_lanes(mask_n m) {
+    lane_int lane[LANES];
+    store_lanes(m, lane);
+    int n = 0;
+    for (int k = 0; k < LANES; k++) n -= (int)lane[k];
+    return n;
+}
+
+// Dot products may contract: |error| <= 3u |a||b| fused, 5u |a||b| unfused (Higham 2002, section 3.1); bounds elsewhere assume the larger.
+inline real_n dot_n(const real_n *a, const real_n *b) {
+#pragma OPENCL FP_CONTRACT ON
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+inline real_n dot_uniform(const real_n *a, global const real *b) {
+#pragma OPENCL FP_CONTRACT ON
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+inline real_n multiply_add(real_n a, real_n b, real_n c) {
+#pragma OPENCL FP_CONTRACT ON
+    return a * b + c;
+}

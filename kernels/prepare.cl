@@ -1,0 +1,54 @@
+// Provides: kernels prepare_triangles and prepare_planes: the records that rays test, from the numbers as given.
+// Needs: lanes.cl, structs, triangle.cl.  Reads: nothing.
+//
+// All in float64, rounded once to `real`; the bounds are derived in triangle.cl.
+inline double length_double(const double *a) { return sqrt(dot_double(a, a)); }
+
+kernel void prepare_triangles(global const double *vertices, double4 local_origin, global Triangle *triangles, int count) {
+    const int slot = get_global_id(0);
+    if (slot >= count) return;
+    const double origin[3] = {local_origin.x, local_origin.y, local_origin.z};
+    double e1[3], e2[3], normal[3];
+    for (int a = 0; a < 3; a++) {
+        const double v0 = vertices[9 * slot + a];
+        e1[a] = vertices[9 * slot + 3 + a] - v0;
+        e2[a] = vertices[9 * slot + 6 + a] - v0;
+        triangles[slot].v0[a] = (real)(v0 - origin[a]);
+    }
+    cross_double(e1, e2, normal);
+    for (int a = 0; a < 3; a++) {
+        triangles[slot].e1[a] = (real)e1[a];
+        triangles[slot].e2[a] = (real)e2[a];
+        triangles[slot].normal[a] = (real)normal[a];
+    }
+    triangles[slot].bound = (real)(64 * UNIT_ROUNDOFF * fmax(length_double(e1), length_double(e2)));
+    triangles[slot].normal_bound = (real)(8 * UNIT_ROUNDOFF * length_double(normal));
+}
+
+kernel void prepare_planes(global const double *vertices, double4 shared_origin, global EdgePlanes *planes, int first, int count) {
+    const int slot = get_global_id(0);
+    if (slot >= count) return;
+    planes += first + slot;
+    const double origin[3] = {shared_origin.x, shared_origin.y, shared_origin.z};
+    double corner[3][3], e1[3], e2[3], normal[3], edge[3][3], longest = 0, steepest = 0;
+    for (int c = 0; c < 3; c++)
+        for (int a = 0; a < 3; a++) corner[c][a] = vertices[9 * slot + 3 * c + a] - origin[a];
+    for (int c = 0; c < 3; c++) {
+        const double *b = corner[(c + 1) % 3], *e = corner[(c + 2) % 3];
+        cross_double(b, e, edge[c]);
+        steepest = fmax(steepest, length_double(edge[c]));
+        longest = fmax(longest, length_double(b) * length_double(e));
+    }
+    for (int a = 0; a < 3; a++) {
+        e1[a] = vertices[9 * slot + 3 + a] - vertices[9 * slot + a];
+        e2[a] = vertices[9 * slot + 6 + a] - vertices[9 * slot + a];
+        planes->u[a] = (real)edge[0][a];
+        planes->v[a] = (real)edge[1][a];
+        planes->w[a] = (real)edge[2][a];
+    }
+    cross_double(e1, e2, normal);
+    for (int a = 0; a < 3; a++) planes->normal[a] = (real)normal[a];
+    planes->offset = (real)dot_double(corner[0], normal);
+    planes->bound = (real)(8 * UNIT_ROUNDOFF * steepest + 16 * 0x1p-53 * longest);
+    planes->normal_bound = (real)(8 * UNIT_ROUNDOFF * length_double(normal));
+}

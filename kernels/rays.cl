@@ -1,0 +1,35 @@
+// Provides: Rays, Hits; rays_prepare, rays_along.
+// Needs: lanes.cl.  Reads: nothing.
+
+// LANES rays. `active` lanes are traced; the others hold anything finite.
+typedef struct {
+    real_n origin[3];
+    real_n direction[3];  // unit length to within 4u
+    real_n inverse[3];    // 1 / direction, bounded by HUGE_INVERSE so that no product with a finite distance is NaN
+    real_n t_min;
+    mask_n octant;        // bit a set: the direction's component a is negative
+    mask_n skip;          // a triangle slot each ray passes by (the one it starts on or ends at), or -1
+    mask_n active;
+} Rays;
+
+// The nearest hit so far: `t` starts as the far end of the ray, `slot` is -1 while nothing is hit.
+typedef struct {
+    real_n t;
+    mask_n slot;
+    //@ hits_members
+} Hits;
+
+// Fills what follows from origin and direction; lanes with a NaN or an infinity become inactive: they hit nothing.
+inline void rays_prepare(Rays *rays) {
+    rays->octant = NO_LANES;
+    for (int a = 0; a < 3; a++) {
+        const real_n d = rays->direction[a];
+        const mask_n negative = is_less(d, (real_n)0);
+        const mask_n tiny = is_less(abs_n(d), (real_n)TINY_COMPONENT);
+        rays->inverse[a] = choose(tiny, choose(negative, (real_n)-HUGE_INVERSE, (real_n)HUGE_INVERSE), R(1.0) / d);
+        rays->octant |= negative & (mask_n)(1 << a);
+        rays->active &= is_at_most(abs_n(d), (real_n)REAL_MAX) & is_at_most(abs_n(rays->origin[a]), (real_n)REAL_MAX);
+    }
+}
+
+inline real_n ray_point(const Rays *rays, real_n t, int axis) { return multiply_add(rays->direction[axis], t, rays->origin[axis]); }

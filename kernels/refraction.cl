@@ -1,0 +1,83 @@
+// Provides: Media (the dielectrics a ray is inside of), refraction_turn: Snell's law and total internal reflection.
+// Needs: hit.cl, structs.  Reads: MEDIA_DEPTH (how many nested dielectrics a ray remembers).
+typedef struct {
+    lane_int object[MEDIA_DEPTH][LANES];
+    real ior[MEDIA_DEPTH][LANES];
+    lane_int count[LANES];
+} Media;
+
+inline void media_begin(Media *media) {
+    for (int k = 0; k < LANES; k++) media->count[k] = 0;
+}
+
+// For each lane with Refract > 0: the refracted direction and the media behind the surface; its weight; or the weight that total
+// internal reflection hands to the reflected ray. A hit on an object that the ray is inside of leaves it, any other enters.
+inline void refraction_turn(global const Material *materials, global const Surface *surfaces, int triangle_slots, int object_count,
+                            const Rays *rays, const Hit *hit, const Media *before, real_n *direction, Media *after, real_n *weight,
+                            real_n *reflected) {
+    real d[3][LANES], n[3][LANES], through[LANES], back[LANES];
+    lane_int found[LANES];
+    store_lanes(hit->found, found);
+    for (int a = 0; a < 3; a++) {
+        store_lanes(rays->direction[a], d[a]);
+        store_lanes(hit->normal[a], n[a]);
+    }
+    *after = *before;
+    for (int k = 0; k < LANES; k++) {
+        const real refract = found[k] ? materials[hit->material[k]].refract : R(0.0);
+        through[k] = back[k] = R(0.0);
+        if (!(refract > R(0.0))) continue;
+        // The media on either side.
+        const lane_int slot = hit->slot[k], object = slot < triangle_slots ? surfaces[slot].object : object_count + slot - triangle_slots;
+        const int count = before->count[k];
+        int at = -1;
+        for (int m = 0; m < count; m++)
+            if (before->object[m][k] == object) at = m;
+        const real from = count > 0 ? before->ior[count - 1][k] : R(1.0);
+        real to = materials[hit->material[k]].ior;
+        if (at >= 0) {
+            for (int m = at; m + 1 < count; m++) {
+                after->object[m][k] = before->object[m + 1][k];
+                after->ior[m][k] = before->ior[m + 1][k];
+            }
+            after->count[k] = count - 1;
+            to = count > 1 ? after->ior[count - 2][k] : R(1.0);
+        } else if (count < MEDIA_DEPTH) {
+            after->object[count][k] = object;
+            after->ior[count][k] = to;
+            after->count[k] = count + 1;
+        }
+        // Snell: d' = r d + (r c - sqrt(1 - r^2 (1 - c^2))) n with c = -d.n and 1 - c^2 from the cross product, exact near 1.
+        const real cx = d[1][k] * n[2][k] - d[2][k] * n[1][k], cy = d[2][k] * n[0][k] - d[0][k] * n[2][k];
+        const real cz = d[0][k] * n[1][k] - d[1][k] * n[0][k], ratio = from / to;
+        const real c = -(d[0][k] * n[0][k] + d[1][k] * n[1][k] + d[2][k] * n[2][k]);
+        const real inside = R(1.0) - ratio * ratio * (cx * cx + cy * cy + cz * cz);
+        if (inside < R(0.0)) {
+            back[k] = refract;
+            continue;
+        }
+        through[k] = refract;
+        for (int a = 0; a < 3; a++) d[a][k] = ratio * d[a][k] + (ratio * c - sqrt(inside)) * n[a][k];
+    }
+    for (int a = 0; a < 3; a++) direction[a] = load_lanes(d[a]);
+    normalize_n(direction);
+    *weight = load_lanes(through);
+    *reflected = load_lanes(back);
+}
+
+//@hook bounce_members
+    Media media;
+//@end
+//@hook begin
+    media_begin(&current.media);
+//@end
+//@hook bounce_weights
+            real_n through[3], passed, internal;
+            Media behind;
+            refraction_turn(materials, surfaces, frame->triangle_slots, frame->object_count, &rays, &hit, &current.media, through, &behind,
+                            &passed, &internal);
+            //@counting count_rays(counters, COUNT_REFRACTED, is_greater(passed * weight, (real_n)0));
+            //@counting count_rays(counters, COUNT_INTERNAL, is_greater(internal * weight, (real_n)0));
+            bounce_push(&bounces, &hit, through, weight * passed, is_greater(passed * weight, (real_n)0), &current)->media = behind;
+            reflected += internal;
+//@end

@@ -1,0 +1,59 @@
+// Provides: kernel render: one packet of pixels a work-item, from the camera's rays to linear colour.
+// Needs: camera.cl, scene.cl, hit.cl and what the effects add.  Reads: PACKET_WIDTH, PACKET_HEIGHT.
+kernel void render(global const Frame *frame, global const int2 *nodes, global const int *indices, global const Triangle *triangles,
+                   global const EdgePlanes *eye_planes, global const double *vertices, global const Object *objects,
+                   global const Surface *surfaces, global const Material *materials, int first_row, int end_row, global float *film
+                   //@ parameters
+) {
+    const int column = get_global_id(0) * PACKET_WIDTH, row = first_row + get_global_id(1) * PACKET_HEIGHT;
+    if (column >= frame->width || row >= end_row) return;
+    Geometry geometry;
+    geometry.nodes = nodes;
+    geometry.indices = indices;
+    geometry.triangles = triangles;
+    geometry.planes = eye_planes;
+    geometry.vertices = vertices;
+    geometry.objects = objects;
+    geometry.object_count = frame->object_count;
+    geometry.slot_count = frame->triangle_slots;
+    for (int a = 0; a < 3; a++) {
+        geometry.shared_origin[a] = frame->eye[a];
+        geometry.local_origin[a] = frame->local_origin[a];
+    }
+    //@ begin
+    Rays rays;
+    camera_rays(frame, column, row, &rays);
+    real_n color[3] = {(real_n)0, (real_n)0, (real_n)0}, weight = (real_n)1;
+    //@ primary
+    for (;;) {
+        Hits hits;
+        hits.t = (real_n)INFINITY;
+        hits.slot = (mask_n)-1;
+        //@ hits_begin
+        //@ trace
+        Hit hit;
+        hit_surface(&geometry, frame, surfaces, &rays, &hits, &hit);
+        // The light that leaves the hit points towards the viewer, without what other rays bring.
+        real_n sum[3], ambient;
+        gather(ambient, materials[hit.material[k]].ambient);
+        for (int a = 0; a < 3; a++) sum[a] = ambient;
+        //@ light
+        for (int a = 0; a < 3; a++) {
+            real_n albedo;
+            gather(albedo, materials[hit.material[k]].color[a]);
+            const real_n seen = choose(hit.found, albedo * sum[a], (real_n)frame->background[a]);
+            color[a] += choose(rays.active, weight * seen, (real_n)0);
+        }
+        //@ spawn
+        //@ next
+    }
+    // Out to the picture, pixel by pixel.
+    real out[3][LANES];
+    for (int a = 0; a < 3; a++) store_lanes(color[a], out[a]);
+    for (int k = 0; k < LANES; k++) {
+        const int x = column + k % PACKET_WIDTH, y = row + k / PACKET_WIDTH;
+        if (x >= frame->width || y >= end_row) continue;
+        for (int a = 0; a < 3; a++) film[3 * ((size_t)y * frame->width + x) + a] = (float)out[a][k];
+    }
+    //@ end
+}

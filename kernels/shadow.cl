@@ -1,0 +1,44 @@
+// Provides: shadow_lit: which hit points a point light sees.
+// Needs: scene.cl, hit.cl, structs.  Reads: SHADOW_SHARED_ORIGIN (1: edge planes as seen from every light are at hand).
+
+// Traced from the light, whose rays share it as their origin, to the point: it ends off the surface by the point's error and the
+// ray's own (4u of its length and of the light's position), starts as far from the light, and passes by the primitive it ends on.
+inline mask_n shadow_lit(const Geometry *geometry, global const Light *light, int index, const Hit *hit, mask_n lit) {
+    Geometry seen = *geometry;
+    seen.planes = geometry->light_planes + (size_t)index * geometry->slot_count;
+    Rays rays;
+    real_n span[3], offset = 0;
+    for (int a = 0; a < 3; a++) {
+        seen.shared_origin[a] = light->given[a];
+        span[a] = hit->point[a] - light->position[a];
+        offset += abs_n(span[a]) + abs_n((real_n)light->position[a]);
+    }
+    offset *= R(8.0) * UNIT_ROUNDOFF;
+    for (int a = 0; a < 3; a++) {
+        rays.origin[a] = (real_n)light->position[a];
+        span[a] = hit_outside(hit, hit->error + offset, a) - light->position[a];
+    }
+    const real_n length = sqrt(dot_n(span, span));
+    for (int a = 0; a < 3; a++) rays.direction[a] = span[a] / length;
+    rays.t_min = offset;
+    rays.active = lit;
+    rays.skip = load_lanes(hit->slot);
+    rays_prepare(&rays);
+    Hits hits;
+    hits.t = length;
+    hits.slot = (mask_n)-1;
+    //@ hits_begin
+    scene_trace(&seen, &rays, SHADOW_SHARED_ORIGIN, 1, &hits);
+    //@counting count_rays(geometry->counters, COUNT_SHADOW, rays.active);
+    return lit & is_less(hits.slot, NO_LANES);
+}
+
+//@hook geometry_members
+    global const EdgePlanes *light_planes;  // slot_count a light
+//@end
+//@hook begin
+    geometry.light_planes = light_planes;
+//@end
+//@hook visible
+        lit = shadow_lit(geometry, light, i, hit, lit);
+//@end

@@ -1,0 +1,77 @@
+// Provides: edge_functions: on which side of a triangle's three edges its rays pass; hit_distance; triangle_far_test in float64.
+// Needs: lanes.cl, rays.cl, geometry.cl.  Reads: nothing.
+//
+// Rays that share their origin o (the eye, a point light) use planes through o and each edge, N = b x c of the corners seen from o,
+// computed from the given numbers in float64 and rounded once (prepare.cl): a test is three dot products.
+//   |fl(d.N) - d.N| <= (1 + 3)u |d||N| (one rounding of N; a dot product, Higham 2002 3.1; 5u unfused), so `bound` = 8u max|N|
+//   holds for |d| <= 1 + 4u; the float64 error of N itself, 16 * 2^-53 max|b||c|, is added to it.
+// Other rays use Moeller and Trumbore (1997) on v0, e1, e2, rounded from the given numbers relative to the local origin. With
+// reach >= |o - v0| + |e| and m = max(|e1|, |e2|), each of u, v, w is a triple product of such lengths: 9 roundings of terms
+// below reach m |d| for T.(d x e2), a shift of 2u reach m for the rounded origin, corner and edges, three of those in w = det - u - v:
+// together below 48u reach m; `bound` = 64u m.
+typedef struct {
+    real_n lowest, highest;  // of the three edge functions: one sign for all three means inside
+    real_n bound;            // each edge function's error is below it
+} EdgeFunctions;
+
+inline EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin) {
+    real_n u, v, w;
+    EdgeFunctions f;
+    if (shared_origin) {
+        global const EdgePlanes *plane = geometry->planes + slot;
+        u = dot_uniform(rays->direction, plane->u);
+        v = dot_uniform(rays->direction, plane->v);
+        w = dot_uniform(rays->direction, plane->w);
+        f.bound = (real_n)plane->bound;
+    } else {
+#pragma OPENCL FP_CONTRACT ON
+        global const Triangle *triangle = geometry->triangles + slot;
+        const real_n *d = rays->direction;
+        global const real *e1 = triangle->e1, *e2 = triangle->e2;
+        const real_n p[3] = {d[1] * e2[2] - d[2] * e2[1], d[2] * e2[0] - d[0] * e2[2], d[0] * e2[1] - d[1] * e2[0]};
+        const real_n t[3] = {rays->origin[0] - triangle->v0[0], rays->origin[1] - triangle->v0[1], rays->origin[2] - triangle->v0[2]};
+        const real_n q[3] = {t[1] * e1[2] - t[2] * e1[1], t[2] * e1[0] - t[0] * e1[2], t[0] * e1[1] - t[1] * e1[0]};
+        u = dot_n(t, p);
+        v = dot_n(d, q);
+        w = dot_uniform(p, e1) - u - v;
+        f.bound = reach * triangle->bound;
+    }
+    f.lowest = min_n(min_n(u, v), w);
+    f.highest = max_n(max_n(u, v), w);
+    return f;
+}
+
+// The distance to the triangle's plane; `grazing` lanes run so nearly inside the plane that it means nothing.
+inline real_n hit_distance(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n *grazing) {
+    global const Triangle *triangle = geometry->triangles + slot;
+    real_n offset, rate;
+    if (shared_origin) {
+        global const EdgePlanes *plane = geometry->planes + slot;
+        offset = (real_n)plane->offset;
+        rate = dot_uniform(rays->direction, plane->normal);
+        *grazing = is_at_most(abs_n(rate), (real_n)plane->normal_bound);
+    } else {
+        const real_n to_corner[3] = {triangle->v0[0] - rays->origin[0], triangle->v0[1] - rays->origin[1], triangle->v0[2] - rays->origin[2]};
+        offset = dot_uniform(to_corner, triangle->normal);
+        rate = dot_uniform(rays->direction, triangle->normal);
+        *grazing = is_at_most(abs_n(rate), (real_n)triangle->normal_bound);
+    }
+    return offset / rate;
+}
+
+inline void cross_double(const double *a, const double *b, double *c) {
+    c[0] = a[1] * b[2] - a[2] * b[1];
+    c[1] = a[2] * b[0] - a[0] * b[2];
+    c[2] = a[0] * b[1] - a[1] * b[0];
+}
+inline double dot_double(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+// The corners of a slot seen from one lane's origin, in float64 from the given numbers.
+inline void corners_seen(const Geometry *geometry, const Rays *rays, int slot, int lane, const int shared_origin, double corner[3][3]) {
+    for (int a = 0; a < 3; a++) {
+        real origin[LANES];
+        store_lanes(rays->origin[a], origin);
+        const double o = shared_origin ? geometry->shared_origin[a] : geometry->local_origin[a] + (double)origin[lane];
+        for (int c = 0; c < 3; c++) corner[c][a] = geometry->vertices[9 * slot + 3 * c + a] - o;
+    }
+}
