@@ -55,6 +55,12 @@ def checked_vertices(vertices: ArrayLike) -> F64:
     return corners
 
 
+def corner_bounds(triangles: F64) -> tuple[F64, F64]:
+    """Bounds lo, hi : (3, n) of triangles (n, 3, 3)."""
+    a, b, c = (np.ascontiguousarray(triangles[:, corner].T) for corner in range(3))
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+
 def round_down(values: F64) -> F32:
     """Greatest float32 that is not above each value."""
     rounded = values.astype(np.float32)
@@ -88,6 +94,14 @@ def starts_of(counts: Ints) -> Ints:
 def spread_runs(starts: Ints, counts: Ints) -> Ints:
     """Positions start, start + 1, ... of every run, one run after another."""
     return np.repeat(starts - starts_of(counts), counts) + np.arange(int(counts.sum()))
+
+
+def child_cells(cell_lo: F64, cell_hi: F64, axis: Ints, plane: F32) -> tuple[F64, F64]:
+    """Cells (3, k) cut at their planes: the cells of the children, (3, 2 k), lower and upper side by side."""
+    lo, hi = np.repeat(cell_lo, 2, axis=1), np.repeat(cell_hi, 2, axis=1)
+    lower = 2 * np.arange(len(axis))
+    hi[axis, lower] = lo[axis, lower + 1] = plane
+    return lo, hi
 
 
 class TreeWriter:
@@ -128,7 +142,10 @@ class TreeWriter:
         child[nodes[order]] = starts_of(in_order)
         count[nodes] = counts
         indices = refs[spread_runs(starts_of(counts)[order], in_order)]
-        lo, hi = (vertices.min(axis=(0, 1)), vertices.max(axis=(0, 1))) if len(vertices) else (np.zeros(3), np.zeros(3))
+        lo, hi = np.zeros(3), np.zeros(3)
+        if len(vertices):
+            corners_lo, corners_hi = corner_bounds(vertices)
+            lo, hi = corners_lo.min(axis=1), corners_hi.max(axis=1)
         return KdTree(lo, hi, axis, position, child, count, indices.astype(np.int32), depth, builder)
 
 

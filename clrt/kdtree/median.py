@@ -1,8 +1,9 @@
 """The report's splitter: the median of the triangles' centroids on the longest axis, a whole level of the tree at a time.
 
-A node is cut on the longest axis of its triangles' bounding box at the median of its triangles' centroids. A triangle with any corner below the plane goes
-to the lower child, one with any above to the upper, one flat in the plane to the lower. A node stays a leaf where the share of
-triangles that would go to both, times log10 of the object's number of triangles, reaches 1, and where a child would get them all.
+A node is cut on the longest axis of its triangles' bounding box, at the median of their centroids. A triangle with any corner below the
+plane goes to the lower child, one with any above to the upper, one flat in the plane to the lower. A node stays a leaf where the
+share of triangles that would go to both, times log10 of the object's number of triangles, reaches 1, and where a child would get
+them all.
 """
 
 from __future__ import annotations
@@ -12,7 +13,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clrt.kdtree.common import F32, F64, Bools, Ints, Progress, Refs, TreeWriter, round_down, round_up, split_positions, starts_of
+from clrt.kdtree.common import (
+    F32,
+    F64,
+    Bools,
+    Ints,
+    Progress,
+    Refs,
+    TreeWriter,
+    child_cells,
+    corner_bounds,
+    round_down,
+    round_up,
+    split_positions,
+    starts_of,
+)
 from clrt.kdtree.tree import KdTree
 
 
@@ -32,7 +47,7 @@ class _Object:
 
     def __init__(self, vertices: F64) -> None:
         self.size = len(vertices)
-        self.lo, self.hi = (np.ascontiguousarray(bound.T) for bound in (vertices.min(axis=1), vertices.max(axis=1)))
+        self.lo, self.hi = corner_bounds(vertices)
         centroids = vertices.mean(axis=1).T
         order = np.argsort(centroids, axis=1, kind="stable")
         self.ascending = np.take_along_axis(centroids, order, axis=1)
@@ -78,7 +93,7 @@ def _longest_axes(geometry: _Object, level: _Level) -> Ints:
     starts = starts_of(level.count)
     lo = np.minimum.reduceat(geometry.lo[:, level.ref], starts, axis=1)
     hi = np.maximum.reduceat(geometry.hi[:, level.ref], starts, axis=1)
-    return np.argmax(hi - lo, axis=0)
+    return np.asarray(np.argmax(hi - lo, axis=0))
 
 
 def _medians(geometry: _Object, level: _Level, axis: Ints) -> F32:
@@ -122,7 +137,5 @@ def _descend(level: _Level, axis: Ints, plane: F32, lower: Bools, upper: Bools, 
     child = np.concatenate([2 * parent[below], 2 * parent[above] + 1])
     order = np.argsort(child, kind="stable")
     count = np.bincount(child, minlength=2 * int(inner.sum()))
-    cell_lo, cell_hi = (np.repeat(cell[:, inner], 2, axis=1) for cell in (level.cell_lo, level.cell_hi))
-    split, first = axis[inner], np.arange(0, len(count), 2)
-    cell_hi[split, first] = cell_lo[split, first + 1] = plane[inner]
+    cell_lo, cell_hi = child_cells(level.cell_lo[:, inner], level.cell_hi[:, inner], axis[inner], plane[inner])
     return _Level(numbered + np.arange(len(count)), count, cell_lo, cell_hi, level.ref[np.concatenate([below, above])[order]])

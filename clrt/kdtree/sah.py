@@ -2,11 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from clrt.kdtree.binning import Level, Splits, best_splits
 from clrt.kdtree.clip import clipped_bounds
-from clrt.kdtree.common import F64, Bools, Ints, Progress, TreeWriter, round_down, round_up, spread_runs, starts_of
+from clrt.kdtree.common import (
+    F32,
+    F64,
+    Bools,
+    Ints,
+    Progress,
+    Refs,
+    TreeWriter,
+    child_cells,
+    corner_bounds,
+    round_down,
+    round_up,
+    spread_runs,
+    starts_of,
+)
 from clrt.kdtree.tree import KdTree
 
 #: Cost of one step down the tree in triangle tests.
@@ -55,8 +71,8 @@ def build_sah(
 def _root(vertices: F64) -> Level:
     """The level of the root alone."""
     n = len(vertices)
-    lo = round_down(np.ascontiguousarray(vertices.min(axis=1).T))
-    hi = round_up(np.ascontiguousarray(vertices.max(axis=1).T))
+    exact_lo, exact_hi = corner_bounds(vertices)
+    lo, hi = round_down(exact_lo), round_up(exact_hi)
     cell_lo, cell_hi = (bound[:, None].astype(np.float64) for bound in (lo.min(axis=1), hi.max(axis=1)))
     return Level(np.zeros(1, np.int64), np.array([n]), cell_lo, cell_hi, np.arange(n, dtype=np.int32), lo, hi)
 
@@ -68,34 +84,16 @@ def _descend(
     count = level.count[inner]
     source = np.flatnonzero(np.repeat(inner, level.count))
     lower, upper = _sides(level, splits, inner, source, count)
-    cell_lo, cell_hi = _child_cells(level, splits, inner)
-    # Clip those that reach into both; a part may turn out to be empty.
-    both = np.flatnonzero(lower & upper)
-    parent = np.repeat(np.arange(len(count)), count)[both]
-    cells = np.concatenate([2 * parent, 2 * parent + 1])
-    lo, hi = clipped_bounds(vertices[level.ref[np.tile(source[both], 2)]], cell_lo[:, cells], cell_hi[:, cells])
-    filled = (lo <= hi).all(axis=0)
-    lower[both], upper[both] = filled[: len(both)], filled[len(both) :]
-    piece = np.full(len(source), -1)
-    piece[both] = np.arange(len(both))
-    # Lay the children out side by side.
-    starts = starts_of(count)
-    children = np.stack([_per_node(lower, starts), _per_node(upper, starts)], axis=1)
-    child_count = children.ravel()
-    place = starts_of(child_count).reshape(-1, 2)
-    order = np.empty(int(child_count.sum()), np.int64)
-    piece_of = np.empty_like(order)
-    for side, goes in enumerate((lower, upper)):
-        taken = np.flatnonzero(goes)
-        spot = spread_runs(place[:, side], children[:, side])
-        order[spot] = source[taken]
-        piece_of[spot] = np.where(piece[taken] >= 0, piece[taken] + side * len(both), -1)
+    cell_lo, cell_hi = child_cells(level.cell_lo[:, inner], level.cell_hi[:, inner], splits.axis[inner], splits.position[inner])
+    pieces = _cut(vertices, level, source, np.repeat(np.arange(len(count)), count), lower, upper, cell_lo, cell_hi)
+    child_count, order, piece = _lay_out(count, source, lower, upper, pieces)
     node = numbered + np.arange(len(child_count))
     leaf = child_count <= smallest
     in_leaf = np.repeat(leaf, child_count)
     writer.leaves(node[leaf], child_count[leaf], level.ref[order[in_leaf]])
-    kept = np.flatnonzero(~in_leaf)
-    return _next_level(level, node[~leaf], child_count[~leaf], cell_lo[:, ~leaf], cell_hi[:, ~leaf], order[kept], piece_of[kept], lo, hi)
+    rest = ~in_leaf
+    ref, lo, hi = _gather(level, order[rest], piece[rest], pieces)
+    return Level(node[~leaf], child_count[~leaf], cell_lo[:, ~leaf], cell_hi[:, ~leaf], ref, lo, hi)
 
 
 def _sides(level: Level, splits: Splits, inner: Bools, source: Ints, count: Ints) -> tuple[Bools, Bools]:
@@ -111,26 +109,51 @@ def _sides(level: Level, splits: Splits, inner: Bools, source: Ints, count: Ints
     return lower, upper
 
 
-def _child_cells(level: Level, splits: Splits, inner: Bools) -> tuple[F64, F64]:
-    """Cells of the children, (3, 2 k), pair by pair."""
-    cell_lo, cell_hi = (np.repeat(cell[:, inner], 2, axis=1) for cell in (level.cell_lo, level.cell_hi))
-    axis, lower = splits.axis[inner], 2 * np.arange(int(inner.sum()))
-    cell_hi[axis, lower] = cell_lo[axis, lower + 1] = splits.position[inner]
-    return cell_lo, cell_hi
+@dataclass
+class _Pieces:
+    """Parts of triangles cut by a split: `of` (s,) gives a source's piece below, + half for that above, or -1; lo, hi (3, 2 half)."""
+
+    of: Ints
+    half: int
+    lo: F32
+    hi: F32
 
 
-def _per_node(flags: Bools, starts: Ints) -> Ints:
-    """Flags set, node by node."""
-    return np.add.reduceat(flags, starts, dtype=np.int64) if len(starts) else np.zeros(0, np.int64)
+def _cut(
+    vertices: F64, level: Level, source: Ints, parent: Ints, lower: Bools, upper: Bools, cell_lo: F64, cell_hi: F64
+) -> _Pieces:
+    """Clip triangles that reach into both children; where nothing is left of a part, clear its flag in `lower` or `upper`."""
+    both = np.flatnonzero(lower & upper)
+    cells = np.concatenate([2 * parent[both], 2 * parent[both] + 1])
+    triangles = vertices[level.ref[source[both]]]
+    lo, hi = clipped_bounds(np.concatenate([triangles, triangles]), cell_lo[:, cells], cell_hi[:, cells])
+    left: Bools = np.all(lo <= hi, axis=0)
+    lower[both], upper[both] = left[: len(both)], left[len(both) :]
+    of = np.full(len(source), -1)
+    of[both] = np.arange(len(both))
+    return _Pieces(of, len(both), round_down(lo), round_up(hi))
 
 
-def _next_level(
-    level: Level, node: Ints, count: Ints, cell_lo: F64, cell_hi: F64, order: Ints, piece: Ints, lo: F64, hi: F64
-) -> Level:
-    """Gather references in their new order; those cut by a split get the bounds of their piece."""
-    new_lo, new_hi = (np.take(bound, order, axis=1) for bound in (level.lo, level.hi))
+def _lay_out(count: Ints, source: Ints, lower: Bools, upper: Bools, pieces: _Pieces) -> tuple[Ints, Ints, Ints]:
+    """Sizes of the children, pair by pair; and, child by child, the reference each entry comes from and its piece or -1."""
+    starts = starts_of(count)
+    below, above = (np.add.reduceat(side, starts, dtype=np.int64) if len(starts) else starts for side in (lower, upper))
+    child_count = np.stack([below, above], axis=1).ravel()
+    place = starts_of(child_count)
+    order = np.empty(int(child_count.sum()), np.int64)
+    piece = np.empty_like(order)
+    for side, goes in enumerate((lower, upper)):
+        taken = np.flatnonzero(goes)
+        spot = spread_runs(place[side::2], child_count[side::2])
+        order[spot] = source[taken]
+        of = pieces.of[taken]
+        piece[spot] = np.where(of >= 0, of + side * pieces.half, -1)
+    return child_count, order, piece
+
+
+def _gather(level: Level, order: Ints, piece: Ints, pieces: _Pieces) -> tuple[Refs, F32, F32]:
+    """References and bounds in their new order; those cut by a split get the bounds of their piece."""
+    lo, hi = (np.take(bound, order, axis=1) for bound in (level.lo, level.hi))
     cut = np.flatnonzero(piece >= 0)
-    new_lo[:, cut] = round_down(lo[:, piece[cut]])
-    new_hi[:, cut] = round_up(hi[:, piece[cut]])
-    return Level(node, count, cell_lo, cell_hi, np.take(level.ref, order), new_lo, new_hi)
-
+    lo[:, cut], hi[:, cut] = pieces.lo[:, piece[cut]], pieces.hi[:, piece[cut]]
+    return np.take(level.ref, order), lo, hi
