@@ -44,11 +44,9 @@ $(VENV)/%.stamp: pyproject.toml $(VENV)/made.stamp
 
 # Where .venv is left from another Python or half made, --clear makes it anew.
 $(VENV)/made.stamp:
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10))' || \
-		{ echo 'clrt needs Python 3.10 or later, and $(PYTHON) is' "$$($(PYTHON) --version 2>&1 || echo missing)."; \
-		  echo 'With another one: make PYTHON=python3.12 run'; exit 1; }
-	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
-		{ echo "$(PYTHON) has no venv module. On Debian and Ubuntu: apt install $$($(PYTHON) -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')"; \
-		  exit 1; }
+	@found=$$($(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2]); sys.exit(sys.version_info < (3, 10))' 2>/dev/null) || \
+		{ echo "clrt needs Python 3.10 or later; $(PYTHON) is $${found:-missing}. With another one: make PYTHON=python3.12 run"; exit 1; }; \
+	$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || \
+		{ echo "$(PYTHON) lacks the venv module. On Debian and Ubuntu: apt install python$$found-venv"; exit 1; }
 	$(PYTHON) -m venv --clear $(VENV)
 	@touch $@
