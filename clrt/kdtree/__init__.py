@@ -1,7 +1,7 @@
 """kd-trees, one an object: `build_tree(vertices, builder="sah" | "median")`.
 
     tree.py         the arrays of a tree, their statistics
-    validate.py     the proof that a tree is right, by overlap.py alone
+    validate.py     the proof that a tree is right: structure here, triangles in coverage.py, by overlap.py alone
     sah.py          the default builder: surface area heuristic (binning.py), clipped references (clip.py)
     median.py       the report's splitter
     common.py       what builders share: checked input, rounding, the writer of a tree

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 LEAF = 3  #: the split_axis of a leaf
 
@@ -33,3 +33,77 @@ class KdTree:
     indices: NDArray[np.int32]
     depth: int
     builder: str
+
+    @property
+    def node_count(self) -> int:
+        """Inner nodes and leaves."""
+        return len(self.split_axis)
+
+    @property
+    def leaf_count(self) -> int:
+        """Leaves, empty ones too."""
+        return int(np.count_nonzero(self.split_axis == LEAF))
+
+    @property
+    def empty_leaf_count(self) -> int:
+        """Leaves without triangles."""
+        return int(np.count_nonzero((self.split_axis == LEAF) & (self.count == 0)))
+
+    @property
+    def reference_count(self) -> int:
+        """Entries of all leaves; a triangle in several leaves counts as often."""
+        return len(self.indices)
+
+    @property
+    def mean_leaf_size(self) -> float:
+        """Triangles in a leaf that has any; 0 without triangles."""
+        return self.reference_count / max(self.leaf_count - self.empty_leaf_count, 1)
+
+    def cells(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The box of every node: lo, hi : (m, 3) float64."""
+        lo, hi = np.tile(self.lo, (self.node_count, 1)), np.tile(self.hi, (self.node_count, 1))
+        level = np.flatnonzero(self.split_axis[:1] != LEAF)
+        while level.size:
+            axis, plane, lower = self.split_axis[level], self.split_pos[level], self.child[level]
+            for bound in (lo, hi):
+                bound[lower] = bound[lower + 1] = bound[level]
+            hi[lower, axis] = lo[lower + 1, axis] = plane
+            children = np.stack([lower, lower + 1], axis=1).ravel()
+            level = children[self.split_axis[children] != LEAF]
+        return lo, hi
+
+    def sah_cost(self, traversal_cost: float) -> float:
+        """Expected cost of a random line through the bounds, in triangle tests: steps * traversal_cost + tests.
+
+        A line that meets a box meets a box within it with the ratio of their areas (Goldsmith and Salmon, 1987). 0 if the bounds
+        have no area.
+        """
+        lo, hi = self.cells()
+        x, y, z = ((hi - lo) / max(float((self.hi - self.lo).max()), np.finfo(np.float64).tiny)).T
+        area = x * y + y * z + z * x
+        per_visit = np.where(self.split_axis == LEAF, self.count, traversal_cost)
+        return float(area @ per_visit / area[0]) if area[0] > 0 else 0.0
+
+    def stats(self) -> dict[str, int | float | str]:
+        """Figures for a report, JSON types."""
+        return {
+            "builder": self.builder,
+            "nodes": self.node_count,
+            "leaves": self.leaf_count,
+            "empty_leaves": self.empty_leaf_count,
+            "references": self.reference_count,
+            "depth": self.depth,
+            "mean_leaf_size": self.mean_leaf_size,
+            "greatest_leaf_size": int(self.count.max(initial=0)),
+            "sah_cost": self.sah_cost(traversal_cost=8.0),
+            "bytes": sum(a.nbytes for a in (self.split_axis, self.split_pos, self.child, self.count, self.indices)),
+        }
+
+    def validate(self, vertices: ArrayLike, *, max_depth: int | None = None) -> int:
+        """Prove the tree right for triangles (n, 3, 3), or raise ValueError; see validate.py for what is proved.
+
+        Returns the number of stray references: entries whose triangle is surely away from its leaf. They cost time, never a hit.
+        """
+        from clrt.kdtree.validate import validate
+
+        return validate(self, np.asarray(vertices, np.float64), max_depth)
