@@ -110,12 +110,12 @@ def nearest(ray: IndexArray, prim: IndexArray, t: FloatArray, numerator: BigArra
         return order
     starts = np.flatnonzero(np.r_[True, ray[order][1:] != ray[order][:-1]])
     ends = np.r_[starts[1:], len(order)]
-    best = order[starts].copy()
+    best: IndexArray = order[starts]
     # Rounding is monotone: only pairs of the same rounded t as the first can beat it.
     follows = np.zeros(len(starts), np.bool_)
     several = ends - starts > 1
     follows[several] = t[order[starts[several] + 1]] == t[order[starts[several]]]
     for k in np.flatnonzero(follows):
         tied = [int(p) for p in order[starts[k] : ends[k]] if t[p] == t[best[k]]]
-        best[k] = min(tied, key=lambda p: (Fraction(numerator[p], denominator[p]), int(prim[p])))
+        best[k] = min(tied, key=lambda p: (Fraction(int(numerator[p]), int(denominator[p])), int(prim[p])))
     return best

@@ -1,0 +1,131 @@
+"""Where light comes from beyond a surface: the reflected and the refracted ray, and the stack of dielectrics a ray is inside of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.reference.geometry import MaterialTable, Primitives
+from clrt.reference.shade import Surface, dot
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+STACK_SIZE = 8  #: dielectrics a ray can be inside of at once
+
+
+@dataclass(frozen=True, eq=False)
+class MediumStack:
+    """For m rays: object (m, 8) ids of the dielectrics entered, ior (m, 8) their indices, count (m,) entries in use, oldest first."""
+
+    object: IndexArray
+    ior: FloatArray
+    count: IndexArray
+
+    @classmethod
+    def outside(cls, m: int) -> MediumStack:
+        return cls(np.full((m, STACK_SIZE), -1, np.int64), np.ones((m, STACK_SIZE)), np.zeros(m, np.int64))
+
+    def __getitem__(self, rows: IndexArray) -> MediumStack:
+        return MediumStack(self.object[rows], self.ior[rows], self.count[rows])
+
+    @property
+    def index(self) -> FloatArray:
+        """(m,) refractive index of the medium around each ray: that of the newest entry, 1 outside of all."""
+        top = np.take_along_axis(self.ior, np.maximum(self.count - 1, 0)[:, None], axis=1)[:, 0]
+        return np.where(self.count > 0, top, 1.0)
+
+    def crossed(self, object_id: IndexArray, ior: FloatArray) -> MediumStack:
+        """Behind the surfaces of `object_id` (m,): an object on the stack is left, any other entered with index `ior` (m,).
+
+        A ninth object replaces the newest entry.
+        """
+        place = np.arange(STACK_SIZE)
+        held = (self.object == object_id[:, None]) & (place < self.count[:, None])
+        leaving = held.any(axis=1)
+        # Leaving: the entries above move down by one.
+        source = np.minimum(place + (leaving[:, None] & (place >= held.argmax(axis=1)[:, None])), STACK_SIZE - 1)
+        ids, iors = np.take_along_axis(self.object, source, axis=1), np.take_along_axis(self.ior, source, axis=1)
+        new = ~leaving[:, None] & (place == np.minimum(self.count, STACK_SIZE - 1)[:, None])
+        count = np.where(leaving, self.count - 1, np.minimum(self.count + 1, STACK_SIZE))
+        return MediumStack(np.where(new, object_id[:, None], ids), np.where(new, ior[:, None], iors), count)
+
+
+@dataclass(frozen=True, eq=False)
+class Bounces:
+    """For m hits: reflected and refracted directions (m, 3) unit, their weights (m,) relative to the hit's, errors, and the stack behind.
+
+    margin : (m,) how far the choice of normals and of total reflection is from another
+    """
+
+    reflected: FloatArray
+    reflect_weight: FloatArray
+    reflect_err: FloatArray
+    refracted: FloatArray
+    refract_weight: FloatArray
+    refract_err: FloatArray
+    behind: MediumStack
+    margin: FloatArray
+
+
+def bounces(prims: Primitives, materials: MaterialTable, surface: Surface, stack: MediumStack) -> Bounces:
+    """Snell's law against the medium around the ray; under total reflection the weight Refract goes to the reflected ray."""
+    ids = surface.material
+    behind = stack.crossed(prims.object_id[surface.prim], materials.ior[ids])
+    glass = materials.refract[ids] > 0.0
+    ratio = np.divide(stack.index, behind.index, where=glass, out=np.ones(len(ids)))
+    refracted, k, flat_margin, stretch = _refract(surface, ratio)
+    total = glass & (k < 0.0)
+    refract_weight = np.where(glass & ~total, materials.refract[ids], 0.0)
+    reflect_weight = materials.reflect[ids] + np.where(total, materials.refract[ids], 0.0)
+    reflected, above_margin = _reflect(surface)
+    margin = np.where(reflect_weight != 0.0, above_margin, np.inf)
+    margin = np.minimum(margin, np.where(glass, np.minimum(np.abs(k) / surface.normal_err, flat_margin), np.inf))
+    bend = 2.0 * surface.curvature * surface.pos_err
+    return Bounces(reflected, reflect_weight, surface.dir_err + bend, refracted, refract_weight, surface.normal_err * stretch, behind, margin)
+
+
+def _reflect(surface: Surface) -> tuple[FloatArray, FloatArray]:
+    """d - 2 (d.N) N; about the geometric normal where that would go below the surface. And the margin of this choice."""
+    d = -surface.view
+    smooth = d - 2.0 * dot(d, surface.n_shade)[:, None] * surface.n_shade
+    flat = d - 2.0 * dot(d, surface.n_geo)[:, None] * surface.n_geo
+    above = dot(smooth, surface.n_geo)
+    margin = np.where(surface.curvature > 0.0, np.abs(above) / surface.normal_err, np.inf)
+    return _unit(np.where((above > 0.0)[:, None], smooth, flat)), margin
+
+
+def _refract(surface: Surface, ratio: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Refracted directions, k = cos^2 of the refracted angle (negative: total reflection), the margin of the choice of normal,
+    and how much the angle's error grows.
+
+    About the shading normal; about the geometric one where the shading normal faces away from the viewer, or where the refracted ray
+    would stay on the viewer's side.
+    """
+    about_shade, k_shade = _snell(surface, surface.n_shade, ratio)
+    about_geo, k_geo = _snell(surface, surface.n_geo, ratio)
+    facing, side = dot(surface.view, surface.n_shade), dot(about_shade, surface.n_geo)
+    use_geo = (facing <= 0.0) | ((k_shade >= 0.0) & (side >= 0.0))
+    choice = np.minimum(np.abs(facing), np.where(k_shade >= 0.0, np.abs(side), np.inf))
+    margin = np.where(surface.curvature > 0.0, choice / surface.normal_err, np.inf)
+    k = np.where(use_geo, k_geo, k_shade)
+    cos_in = np.abs(np.where(use_geo, dot(surface.view, surface.n_geo), facing))
+    stretch = np.maximum(1.0, ratio * cos_in / np.sqrt(np.maximum(k, 1e-6)))
+    return np.where(use_geo[:, None], about_geo, about_shade), k, margin, stretch
+
+
+def _snell(surface: Surface, normal: FloatArray, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """ratio d + (ratio cos - sqrt(k)) n with k = 1 - ratio^2 (1 - cos^2), taking 1 - cos^2 as |view x n|^2; unit (m, 3), and k (m,)."""
+    cos_in = dot(surface.view, normal)
+    sine = np.cross(surface.view, normal)
+    k = 1.0 - ratio**2 * dot(sine, sine)
+    bent = -ratio[:, None] * surface.view + (ratio * cos_in - np.sqrt(np.maximum(k, 0.0)))[:, None] * normal
+    return _unit(bent), k
+
+
+def _unit(v: FloatArray) -> FloatArray:
+    length = np.linalg.norm(v, axis=1, keepdims=True)
+    return np.divide(v, length, where=length > 0.0, out=v.copy())

@@ -1,0 +1,142 @@
+"""What light leaves a hit towards the viewer by itself: shading normals, Phong's terms, shadows. Formula: docs/conventions.md."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.reference.crossings import Rays
+from clrt.reference.geometry import MaterialTable, Primitives
+from clrt.reference.visibility import occluded
+from clrt.scene.model import PointLight
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+NO_CONSEQUENCE = 1e-9  #: a decision that changes a pixel by less than this is none
+STEEPEST = 0.01  #: cosine below which a slanted hit magnifies errors no further
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """m hits.
+
+    point : (m, 3); prim : (m,); material : (m,)
+    view : (m, 3) unit, towards the viewer; n_geo : (m, 3) unit, on the viewer's side; n_shade : (m, 3) unit, on n_geo's side
+    curvature : (m,) 1 / length; pos_err : (m,) length, dir_err : (m,) as for Rays, at the hit
+    margin : (m,) how far the choice of sides is from another
+    """
+
+    point: FloatArray
+    prim: IndexArray
+    material: IndexArray
+    view: FloatArray
+    n_geo: FloatArray
+    n_shade: FloatArray
+    curvature: FloatArray
+    pos_err: FloatArray
+    dir_err: FloatArray
+    margin: FloatArray
+
+    @property
+    def normal_err(self) -> FloatArray:
+        """(m,) error of angles at the surface: of a direction, and of the normal of a curved one."""
+        return self.dir_err + self.curvature * self.pos_err
+
+
+def dot(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Row by row: (m, 3), (m, 3) -> (m,)."""
+    result: FloatArray = np.einsum("mi,mi->m", a, b)
+    return result
+
+
+def surfaces(prims: Primitives, rays: Rays, prim: IndexArray, t: FloatArray) -> Surface:
+    """The surface where each ray hits: prim (m,) >= 0, t (m,) in lengths of the direction."""
+    unit = rays.direction / rays.speed[:, None]
+    point = rays.origin + t[:, None] * rays.direction
+    n_geo, n_shade = np.empty_like(point), np.empty_like(point)
+    mesh = prim < prims.triangle_count
+    n_geo[mesh] = prims.n_geo[prim[mesh]]
+    n_shade[mesh] = _interpolated(prims, prim[mesh], rays.origin[mesh], rays.direction[mesh])
+    sphere = prim[~mesh] - prims.triangle_count
+    n_geo[~mesh] = (point[~mesh] - prims.centers[sphere]) / prims.radii[sphere][:, None]
+    n_shade[~mesh] = n_geo[~mesh] = n_geo[~mesh] / np.linalg.norm(n_geo[~mesh], axis=1, keepdims=True)
+    n_geo = np.where((dot(n_geo, unit) > 0.0)[:, None], -n_geo, n_geo)
+    agreement = dot(n_shade, n_geo)
+    n_shade = np.where((agreement < 0.0)[:, None], -n_shade, n_shade)
+    curvature = prims.curvature[prim]
+    spread = rays.pos_err + t * rays.speed * rays.dir_err
+    pos_err = spread / np.maximum(-dot(n_geo, unit), STEEPEST)
+    margin = np.where(curvature > 0.0, np.abs(agreement) / (1.0 + curvature * pos_err), np.inf)
+    return Surface(point, prim, prims.material[prim], -unit, n_geo, n_shade, curvature, pos_err, rays.dir_err, margin)
+
+
+def _interpolated(prims: Primitives, tri: IndexArray, origin: FloatArray, direction: FloatArray) -> FloatArray:
+    """Unit normals (1 - u - v) n0 + u n1 + v n2; u, v weights of corners 1 and 2, in proportion to the volumes d . (C x A), d . (A x B)."""
+    to = prims.vertices[tri] - origin[:, None]
+    weights = np.einsum("mi,mci->mc", direction, np.cross(to[:, [1, 2, 0]], to[:, [2, 0, 1]]))
+    normals = prims.corner_normals[tri]
+    # A face's own normal stays as it is given: interpolation would round it.
+    flat = prims.curvature[tri] == 0.0
+    total = weights.sum(axis=1, keepdims=True)
+    weights = np.divide(weights, total, where=total != 0.0, out=np.full_like(weights, 1.0 / 3.0))
+    mixed = np.where(flat[:, None], normals[:, 0], np.einsum("mc,mci->mi", weights, normals))
+    length = np.linalg.norm(mixed, axis=1, keepdims=True)
+    result: FloatArray = np.divide(mixed, length, where=length > 0.0, out=prims.n_geo[tri].copy())
+    return result
+
+
+def local_color(
+    prims: Primitives, materials: MaterialTable, lights: tuple[PointLight, ...], surface: Surface, weight: FloatArray, tile_bytes: int
+) -> tuple[FloatArray, FloatArray, int]:
+    """C (Ka + sum over lights of visible Lrgb (Kd N.L + Ks (R.V)^exponent)).
+
+    weight : (m,) of the ray in its pixel; it only scales what counts as a decision
+    Returns color (m, 3), margin (m,) and the number of shadow rays traced.
+    """
+    ids = surface.material
+    total = np.repeat(materials.ambient[ids][:, None], 3, axis=1)
+    margin = surface.margin.copy()
+    shadow_rays = 0
+    for light in lights:
+        power = materials.color[ids] * np.array(light.color)
+        shine, lit, close = _light_term(materials, surface, np.array(light.position), np.abs(power).max(axis=1, initial=0.0) * weight)
+        margin = np.minimum(margin, close)
+        traced = np.flatnonzero(lit & (shine != 0.0) & (power != 0.0).any(axis=1) & (weight != 0.0))
+        shadow_rays += len(traced)
+        blocked, closeness = occluded(prims, _segments(surface, traced, np.array(light.position)), tile_bytes)
+        counts = np.abs(shine * power.max(axis=1, initial=0.0) * weight)[traced] > NO_CONSEQUENCE
+        margin[traced] = np.where(counts, np.minimum(margin[traced], closeness), margin[traced])
+        visible = traced[~blocked]
+        total[visible] += shine[visible, None] * np.array(light.color)
+    return materials.color[ids] * total, margin, shadow_rays
+
+
+def _segments(surface: Surface, rows: IndexArray, position: FloatArray) -> Rays:
+    """From the hits to the light. The far end is exact: the direction adds no error but its own rounding."""
+    origin = surface.point[rows]
+    return Rays(origin, position - origin, surface.prim[rows], surface.pos_err[rows], np.ones(len(rows)))
+
+
+def _light_term(
+    materials: MaterialTable, surface: Surface, position: FloatArray, scale: FloatArray
+) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
+    """Kd max(N.L, 0) + Ks max(R.V, 0)^exponent (m,); whether the light is on the viewer's side (m,); closeness to the other side (m,)."""
+    ids = surface.material
+    to_light = position - surface.point
+    distance = np.linalg.norm(to_light, axis=1)
+    unit = np.divide(to_light, distance[:, None], where=distance[:, None] > 0.0, out=np.zeros_like(to_light))
+    n_l, g_l = dot(surface.n_shade, unit), dot(surface.n_geo, unit)
+    r_v = 2.0 * n_l * dot(surface.n_shade, surface.view) - dot(unit, surface.view)
+    gloss = np.where(r_v > 0.0, np.power(np.maximum(r_v, 0.0), materials.exponent[ids]), 0.0) * materials.specular[ids]
+    shine = materials.diffuse[ids] * np.maximum(n_l, 0.0) + gloss
+    lit = (n_l > 0.0) & (g_l > 0.0)
+    # At N.L = 0 only the specular term jumps, at n_geo.L = 0 both do.
+    moved = np.divide(surface.pos_err, distance, where=distance > 0.0, out=np.full_like(distance, np.inf))
+    by_shade, by_geo = np.abs(n_l) / (1.0 + moved + surface.curvature * surface.pos_err), np.abs(g_l) / (1.0 + moved)
+    jump_shade, jump_geo = np.abs(gloss) * scale > NO_CONSEQUENCE, np.abs(shine) * scale > NO_CONSEQUENCE
+    leave = np.minimum(np.where(jump_shade, by_shade, np.inf), np.where(jump_geo, by_geo, np.inf))
+    enter = np.maximum(np.where(n_l > 0.0, 0.0, by_shade), np.where(g_l > 0.0, 0.0, by_geo))
+    return shine, lit, np.where(lit, leave, np.where(jump_geo, enter, np.inf))

@@ -1,0 +1,144 @@
+"""The reference picture: a float64 ray tracer over all primitives, without a tree, for comparison with anything faster.
+
+It follows docs/conventions.md to the letter and shares no code with the devices' side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.errors import SceneError
+from clrt.reference.bounce import MediumStack, bounces
+from clrt.reference.crossings import Rays
+from clrt.reference.geometry import MaterialTable, Primitives
+from clrt.reference.lines import TILE_BYTES
+from clrt.reference.shade import Surface, local_color, surfaces
+from clrt.reference.visibility import closest
+from clrt.scene.model import Scene
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+PIXELS_AT_ONCE = 1 << 15
+
+
+@dataclass(frozen=True, eq=False)
+class ReferencePicture:
+    """What the scene looks like, and how sure that is.
+
+    pixels : (h, w, 3) float64, linear, unclamped
+    prim_id : (h, w) int64, the primitive each primary ray hits first, -1 for none
+    t : (h, w) float64, where: eye + t * direction, direction as given; inf for none
+    margin : (h, w) float64, the smallest distance to a flipped decision over all rays of the pixel, in relative errors: rounding with a
+        unit roundoff well below it (say by a factor of 100) cannot change what the pixel's rays hit. Measured up to about 1e-3; what is
+        greater, inf included, only means far.
+    rays : how many rays were traced, by kind: primary, shadow, reflected, refracted
+    """
+
+    pixels: FloatArray
+    prim_id: IndexArray
+    t: FloatArray
+    margin: FloatArray
+    rays: dict[str, int]
+
+
+@dataclass(frozen=True, eq=False)
+class _Wave:
+    """All rays of one depth: what they contribute to which pixel, and the media they are in."""
+
+    rays: Rays
+    weight: FloatArray
+    pixel: IndexArray
+    stack: MediumStack
+
+
+@dataclass(frozen=True, eq=False)
+class _World:
+    scene: Scene
+    prims: Primitives
+    materials: MaterialTable
+    tile_bytes: int
+
+
+def render(scene: Scene, *, directions: FloatArray | None = None, chunk_bytes: int = TILE_BYTES) -> ReferencePicture:
+    """Trace the scene's picture, one ray through each pixel's centre.
+
+    directions : (h, w, 3) of any length, in place of `scene.camera.directions()`; float32 ones are taken as the exact numbers they are
+    chunk_bytes : memory for one tile of rays times triangles
+    Coordinates from about 1e-60 to 1e60 keep their precision. Raises SceneError for directions that do not fit or are zero or not finite,
+    for a refracting material without an index, and for primitive ids with gaps.
+    """
+    height, width = scene.camera.height, scene.camera.width
+    d = scene.camera.directions() if directions is None else np.asarray(directions).astype(np.float64)
+    if d.shape != (height, width, 3):
+        raise SceneError(f"directions have the shape {d.shape}; a picture of {width} x {height} takes {(height, width, 3)}")
+    if not np.isfinite(d).all() or not d.any(axis=2).all():
+        raise SceneError("a direction is zero or not finite; every pixel needs one")
+    world = _World(scene, Primitives.build(scene), MaterialTable.build(scene), chunk_bytes)
+    picture = ReferencePicture(
+        np.zeros((height * width, 3)), np.full(height * width, -1, np.int64), np.full(height * width, np.inf),
+        np.full(height * width, np.inf), dict.fromkeys(("primary", "shadow", "reflected", "refracted"), 0),
+    )  # fmt: skip
+    for start in range(0, height * width, PIXELS_AT_ONCE):
+        pixel = np.arange(start, min(start + PIXELS_AT_ONCE, height * width))
+        wave = _primary(scene, d.reshape(-1, 3)[pixel], pixel)
+        picture.rays["primary"] += len(pixel)
+        for depth in range(scene.depth + 1):
+            wave = _trace(world, wave, picture, depth)
+            if not len(wave.pixel):
+                break
+    shape = (height, width)
+    return ReferencePicture(picture.pixels.reshape(*shape, 3), picture.prim_id.reshape(shape), picture.t.reshape(shape),
+                            picture.margin.reshape(shape), picture.rays)  # fmt: skip
+
+
+def _primary(scene: Scene, directions: FloatArray, pixel: IndexArray) -> _Wave:
+    m = len(pixel)
+    origin = np.broadcast_to(np.asarray(scene.camera.eye, np.float64), (m, 3)).copy()
+    rays = Rays(origin, directions, np.full(m, -1, np.int64), np.zeros(m), np.ones(m))
+    return _Wave(rays, np.ones(m), pixel, MediumStack.outside(m))
+
+
+def _trace(world: _World, wave: _Wave, picture: ReferencePicture, depth: int) -> _Wave:
+    """Add what the rays of one depth see by themselves; return those of the next."""
+    prim, t, margin = closest(world.prims, wave.rays, world.tile_bytes)
+    if depth == 0:
+        picture.prim_id[wave.pixel], picture.t[wave.pixel] = prim, t
+    np.minimum.at(picture.margin, wave.pixel, margin)
+    missed, hit = np.flatnonzero(prim < 0), np.flatnonzero(prim >= 0)
+    background = np.array(world.scene.background, np.float64)
+    np.add.at(picture.pixels, wave.pixel[missed], wave.weight[missed, None] * background)
+    wave, prim, t = _select(wave, hit), prim[hit], t[hit]
+    surface = surfaces(world.prims, wave.rays, prim, t)
+    color, margin, shadow_rays = local_color(
+        world.prims, world.materials, world.scene.lights, surface, wave.weight, world.tile_bytes
+    )
+    picture.rays["shadow"] += shadow_rays
+    np.add.at(picture.pixels, wave.pixel, wave.weight[:, None] * color)
+    np.minimum.at(picture.margin, wave.pixel, margin)
+    return _next(world, wave, surface, picture) if depth < world.scene.depth else _select(wave, np.zeros(0, np.int64))
+
+
+def _select(wave: _Wave, rows: IndexArray) -> _Wave:
+    rays = Rays(*(getattr(wave.rays, name)[rows] for name in ("origin", "direction", "own", "pos_err", "dir_err")))
+    return _Wave(rays, wave.weight[rows], wave.pixel[rows], wave.stack[rows])
+
+
+def _next(world: _World, wave: _Wave, surface: Surface, picture: ReferencePicture) -> _Wave:
+    """Reflected rays, then refracted ones, those of weight 0 left out."""
+    b = bounces(world.prims, world.materials, surface, wave.stack)
+    np.minimum.at(picture.margin, wave.pixel, b.margin)
+    up, down = np.flatnonzero(wave.weight * b.reflect_weight), np.flatnonzero(wave.weight * b.refract_weight)
+    picture.rays["reflected"] += len(up)
+    picture.rays["refracted"] += len(down)
+    both = np.concatenate([up, down])
+    direction = np.concatenate([b.reflected[up], b.refracted[down]])
+    dir_err = np.concatenate([b.reflect_err[up], b.refract_err[down]])
+    weight = wave.weight[both] * np.concatenate([b.reflect_weight[up], b.refract_weight[down]])
+    above, behind = wave.stack[up], b.behind[down]
+    stack = MediumStack(*(np.concatenate([getattr(above, n), getattr(behind, n)]) for n in ("object", "ior", "count")))
+    rays = Rays(surface.point[both], direction, surface.prim[both], surface.pos_err[both], dir_err)
+    return _Wave(rays, weight, wave.pixel[both], stack)
