@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import resource
@@ -208,3 +209,48 @@ def test_piped_output_is_plain(tmp_path: Path) -> None:
     assert error == b""
     assert b"\x1b" not in out
     assert out.isascii()
+
+
+def clrt(folder: Path, *arguments: str) -> subprocess.CompletedProcess[bytes]:
+    """The real program, renderer and all."""
+    command = [sys.executable, "-m", "clrt", *arguments]
+    return subprocess.run(command, cwd=folder, env=child_environment(), capture_output=True, check=False)
+
+
+def test_real_render_counts_every_ray_of_a_scene_whose_rays_are_known(tmp_path: Path) -> None:
+    # A wall that fills the view, lit, with nothing that could shadow or mirror: a primary ray a pixel and one test of each.
+    (tmp_path / "scene.txt").write_text(SCENE.replace("-1 -1 2  1 -1 2  0 1 2", "-90 -90 2  90 -90 2  0 90 2"))
+    done = clrt(tmp_path, "scene.txt", "--size", "40x24", "--stats", "s.json", "--dump-kernel", "k.cl")
+    assert (done.returncode, done.stderr) == (0, b"")
+    stats = json.loads((tmp_path / "s.json").read_text())
+    assert (stats["primary_rays"], stats["rays"], stats["tests_per_ray"]) == (960, 960, 1.0)
+    assert (stats["width"], stats["height"], stats["nodes"], stats["objects"][0]["triangles"]) == (40, 24, 1, 1)
+    assert b"kernel" in (tmp_path / "k.cl").read_bytes()
+    assert files(tmp_path) == ["k.cl", "s.json", "scene.png", "scene.txt"]
+
+
+def test_real_render_of_a_device_that_is_not_there_is_one_line_and_2(tmp_path: Path) -> None:
+    (tmp_path / "scene.txt").write_text(SCENE)
+    done = clrt(tmp_path, "scene.txt", "--device", "no such device")
+    assert (done.returncode, done.stdout) == (2, b"")
+    assert re.fullmatch(rb"clrt: error: .*\n", done.stderr)
+    assert files(tmp_path) == ["scene.txt"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wait_s", [0.6, 1.5, 3.0])
+def test_real_render_ctrl_c_ends_within_a_second(tmp_path: Path, wait_s: float) -> None:
+    # Two mirrors face each other around the eye, so that most of 16 million rays are reflected 64 times.
+    mirrors = "M 1 1 1 0.1 0.1 0 1 0.99\nT -50 -50 2  50 -50 2  0 90 2\nT -50 -50 -2  50 -50 -2  0 90 -2\nO\n"
+    (tmp_path / "scene.txt").write_text("E 0 0 0\nV 0 0.1 1\nF 45\nR 4096 4096\nL 0 0 1\n" + mirrors)
+    command = [sys.executable, "-m", "clrt", "scene.txt", "--depth", "64"]
+    child = subprocess.Popen(command, cwd=tmp_path, env=child_environment(), stderr=subprocess.PIPE)
+    assert child.stderr is not None
+    time.sleep(wait_s)
+    assert child.poll() is None
+    began = time.monotonic()
+    child.send_signal(signal.SIGINT)
+    assert child.wait(20) == 130
+    assert time.monotonic() - began < 1.0
+    assert b"clrt: interrupted" in child.stderr.read()
+    assert files(tmp_path) == ["scene.txt"]

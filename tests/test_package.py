@@ -103,6 +103,6 @@ def test_wheel_holds_kernels_and_types_and_works_by_itself(tmp_path: Path) -> No
     assert {"clrt/py.typed", "clrt/cli/main.py"} <= names
     assert not any(name.startswith(("tests/", "scenes/", "kernels/")) for name in names)
     assert python("import clrt; print(clrt.__file__)", tmp_path, tmp_path / "site") == str(tmp_path / "site/clrt/__init__.py")
-    scene = ROOT / "scenes" / "first.txt"
-    render = f"import clrt; print(clrt.render({str(scene)!r}, size=(16, 16)).width)"
-    assert python(render, tmp_path, tmp_path / "site") == "16"
+    (tmp_path / "scene.txt").write_text("E 0 0 -1\nV 0 0 1\nF 45\nR 8 8\nL 0 0 -9\nM 1 1 1 1 0 0 1 0\nT -9 -9 2 9 -9 2 0 9 2\n")
+    render = "import clrt; print(clrt.render('scene.txt').to_uint8().min())"
+    assert python(render, tmp_path, tmp_path / "site") == "255"  # a white wall, lit by its ambient part alone

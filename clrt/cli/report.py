@@ -74,8 +74,8 @@ def object_table(stats: RunStats) -> Table:
 
 
 def time_table(stats: RunStats) -> Table:
-    result = table(["read", "build", "compile", "render", "write", "total"])
-    times = (stats.read_s, stats.build_s, stats.compile_s, stats.render_s, stats.write_s, stats.total_s)
+    result = table(["read", "build", "upload", "compile", "render", "write", "total"])
+    times = (stats.read_s, stats.build_s, stats.upload_s, stats.compile_s, stats.render_s, stats.write_s, stats.total_s)
     result.add_row(*(seconds(t) for t in times))
     return result
 
