@@ -144,7 +144,7 @@ def _run(tracer: Tracer, phase: str, tell: Progress) -> None:
     scene = tracer.buffers.packed.scene
     bounces = any(f.name == "bounce" for f in tracer.buffers.features.active)
     rays_a_pixel = (1 + len(scene.lights)) * (1 + (2 * scene.depth if bounces else 0))
-    rows = max(8, _FIRST_LAUNCH // (rays_a_pixel * tracer.width))
+    rows = max(8, _FIRST_LAUNCH // (rays_a_pixel * tracer.width) // 8 * 8)
     row = 0
     while row < tracer.height:
         tell(phase, row / tracer.height)

@@ -62,6 +62,7 @@ inline void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction
     Bounce current;
     bounces.count = 0;
     current.depth_left = frame->depth;
+    //@ bounce_begin
 //@end
 //@hook trace
         // The eye's rays share their origin; those that go on do not.

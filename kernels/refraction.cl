@@ -68,7 +68,7 @@ inline void refraction_turn(global const Material *materials, global const Surfa
 //@hook bounce_members
     Media media;
 //@end
-//@hook begin
+//@hook bounce_begin
     media_begin(&current.media);
 //@end
 //@hook bounce_weights

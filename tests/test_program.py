@@ -1,0 +1,113 @@
+"""Composed programs hold what a scene calls for and nothing else, and refuse options that break their bounds."""
+
+from __future__ import annotations
+
+import itertools
+import re
+
+import numpy as np
+import pytest
+
+from clrt.device import program
+from clrt.device.context import Device
+from clrt.device.program import Shape
+from clrt.errors import ClrtError, DeviceError, LimitError
+from clrt.features import FEATURES, Feature, Features
+from clrt.precision import RUNGS, rung
+
+SHAPE = Shape(stack=16, depth=5)
+ALL = Features(tuple((f.name, 0) for f in FEATURES))
+#: words that betray an effect, besides the names of its file, arguments and struct members
+WORDS = {
+    "spheres": ("sphere",),
+    "smooth": ("smooth", "corner_normals"),
+    "shadows": ("shadow", "light_planes"),
+    "direct light": ("direct_light", "diffuse *", "pow("),
+    "refraction": ("refract", "ior", "media"),
+    "mirror": ("mirror", "reflect;"),
+    "bounce": ("bounce",),
+}
+
+
+def _features(*names: str) -> Features:
+    return Features(tuple((f.name, 0) for f in FEATURES if f.name in names))
+
+
+def _traces(feature: Feature, source: str) -> list[str]:
+    words = [feature.kernel, *WORDS[feature.name], *(n for n, _ in feature.parameters), *(f" {n};" for n, *_ in feature.material + feature.frame)]
+    return [w for w in words if w.lower() in source.lower()]
+
+
+@pytest.mark.parametrize("feature", FEATURES, ids=lambda f: f.name)
+def test_source_without_an_effect_holds_none_of_its_names(feature: Feature) -> None:
+    others = _features(*(f.name for f in FEATURES if f.name != feature.name))
+    with_it = program.compose(ALL, rung("watertight"), 16, SHAPE)
+    assert _traces(feature, with_it), "the words looked for must occur where the effect is on"
+    dependents = {"direct light": ("shadows",), "bounce": ("mirror", "refraction")}.get(feature.name, ())
+    left = Features(tuple(pair for pair in others.lines if pair[0] not in dependents))
+    assert _traces(feature, program.compose(left, rung("watertight"), 16, SHAPE)) == []
+
+
+def test_plain_source_holds_no_effect_and_no_mark() -> None:
+    source = program.compose(Features(()), rung("watertight"), 16, SHAPE)
+    for feature in FEATURES:
+        assert _traces(feature, source) == []
+    assert "//@" not in source
+    assert "count_rays" not in source
+
+
+def test_counting_build_differs_only_by_what_counts() -> None:
+    plain = program.compose(ALL, rung("watertight"), 16, SHAPE)
+    counting = program.compose(ALL, rung("watertight"), 16, SHAPE, counting=True)
+    assert "counters" not in plain
+    assert counting.count("count_rays(") >= 5
+
+
+def test_every_chunk_names_its_file() -> None:
+    source = program.compose(ALL, rung("watertight"), 16, SHAPE)
+    for name in ("lanes.cl", "kdtree.cl", "render.cl", "sphere.cl"):
+        assert f'#line 1 "{name}"' in source
+
+
+def test_line_directives_are_true(device: Device) -> None:
+    """A fault planted behind all hooks is reported at its line of the file that a person would open."""
+    source = program.compose(ALL, rung("watertight"), 16, SHAPE)
+    text = program.kernel_source("render.cl")[0]
+    line = 1 + text[: text.index("real out[3][LANES];")].count("\n")
+    broken = source.replace("real out[3][LANES];", "real out[3][LANES]; planted_fault;")
+    with pytest.raises(DeviceError, match=rf"render\.cl:{line}:\d+: .*planted_fault"):
+        program.build(device, broken)
+
+
+@pytest.mark.parametrize("names", list(itertools.combinations([f.name for f in FEATURES if f.name != "bounce"], 2)))
+def test_pairs_of_effects_compile_for_any_width(device: Device, names: tuple[str, str]) -> None:
+    wanted = {*names} | ({"bounce"} if {"mirror", "refraction"} & set(names) else set()) | ({"direct light"} if "shadows" in names else set())
+    lanes = {0: 16, 1: 8, 2: 4, 3: 1}[sum(map(ord, "".join(names))) % 4]
+    program.build(device, program.compose(_features(*wanted), rung("watertight"), lanes, SHAPE))
+
+
+def test_stack_size_covers_the_depth() -> None:
+    for depth in range(100):
+        assert depth < program.stack_size(depth) <= max(8, depth + 8)
+
+
+def test_private_memory_beyond_a_thread_is_refused() -> None:
+    with pytest.raises(LimitError, match="--depth"):
+        program.check_limits(rung("watertight"), 16, Shape(stack=64, depth=2000), ALL)
+    program.check_limits(rung("watertight"), 16, Shape(stack=64, depth=64), ALL)
+
+
+@pytest.mark.parametrize("option", ["-cl-fast-relaxed-math", "-cl-unsafe-math-optimizations", "-cl-finite-math-only", "-cl-mad-enable"])
+def test_unsafe_build_options_are_refused(device: Device, option: str) -> None:
+    with pytest.raises(DeviceError, match=re.escape(option)):
+        program.build(device, "kernel void f() {}", (option,))
+
+
+def test_unknown_precision_names_the_rungs() -> None:
+    with pytest.raises(ClrtError, match=", ".join(RUNGS)):
+        rung("sloppy")
+
+
+def test_lanes_of_a_rung_fill_the_same_vector() -> None:
+    assert [rung("watertight").lanes(n) for n in (16, 8, 4, 1)] == [16, 8, 4, 1]
+    assert np.dtype(rung("watertight").real).itemsize * 8 == rung("watertight").bits
