@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
-
 from clrt.scene.camera import build_camera
 from clrt.scene.faults import Faults
 from clrt.scene.grammar import LETTERS
-from clrt.scene.model import FloatArray, Material, MeshObject, PointLight, Scene, Spheres
+from clrt.scene.model import Material, MeshObject, PointLight, Scene, Spheres
 from clrt.scene.objects import build_objects, material_of
 from clrt.scene.text import Declarations, read_declarations, read_file
+from clrt.scene.triangles import flip_x
 from clrt.scene.words import WORDS, Draft
+
+_ANYTHING = re.compile(r"[^\s\ufeff]")
 
 
 def load_scene(path: str | PathLike[str], *, right_handed: bool = False, split_objects: bool = False) -> Scene:
@@ -31,14 +33,14 @@ def load_scene(path: str | PathLike[str], *, right_handed: bool = False, split_o
 def parse_scene(text: str, source: str = "<text>", *, right_handed: bool = False, split_objects: bool = False) -> Scene:
     """Check a scene text that is in memory; `source` stands for the file's name in messages. Otherwise as `load_scene`."""
     faults = Faults(source)
-    if not text.strip("\ufeff \t\r\n"):
+    if not _ANYTHING.search(text):
         faults.add(1, 1, "the text is empty; a scene has at least the lines E, V, F, R, M and a T or an S")
         faults.raise_if_any()
     found = read_declarations(text, source, faults)
     _check_primitives(found, faults)
     _check_materials(found, faults)
     _check_words(found, faults)
-    camera = build_camera(found, faults)
+    camera = build_camera(found, right_handed, faults)
     faults.raise_if_any()
     assert camera is not None  # a camera that cannot be built is a fault
 
@@ -53,7 +55,7 @@ def parse_scene(text: str, source: str = "<text>", *, right_handed: bool = False
         camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,
         source, tuple(warnings),
     )  # fmt: skip
-    return mirrored(scene) if right_handed else scene
+    return _mirrored(scene) if right_handed else scene
 
 
 def _check_primitives(found: Declarations, faults: Faults) -> None:
@@ -80,8 +82,7 @@ def _check_words(found: Declarations, faults: Faults) -> None:
     first: dict[str, int] = {}
     for call in found.words:
         if call.name in first and WORDS[call.name].once:
-            column = found.token(call.line, 0).column
-            faults.add(call.line, column, f"a second {call.name} line; the first is line {first[call.name]}, remove one")
+            faults.add(call.line, call.column, f"a second {call.name} line; the first is line {first[call.name]}, remove one of the two")
         first.setdefault(call.name, call.line)
 
 
@@ -110,21 +111,13 @@ def _spheres(found: Declarations) -> Spheres:
     return Spheres(rows.values[:, :3].copy(), rows.values[:, 3].copy(), material_of(found, rows.lines), int(rows.lines[0]))
 
 
-def mirrored(scene: Scene) -> Scene:
-    """The same scene with x turned round: right-handed axes as left-handed ones, and back."""
-    spheres = replace(scene.spheres, centers=_flip_x(scene.spheres.centers))
-    camera = replace(scene.camera, eye=_flip_x(scene.camera.eye), corners=_flip_x(scene.camera.corners))
+def _mirrored(scene: Scene) -> Scene:
+    """The same scene with x turned round, but for the camera, which is built from turned lines."""
+    spheres = replace(scene.spheres, centers=flip_x(scene.spheres.centers))
     lights = tuple(replace(light, position=(0.0 - light.position[0], *light.position[1:])) for light in scene.lights)
-    return replace(scene, camera=camera, lights=lights, objects=tuple(map(_mirrored_object, scene.objects)), spheres=spheres)
+    return replace(scene, lights=lights, objects=tuple(map(_mirrored_object, scene.objects)), spheres=spheres)
 
 
 def _mirrored_object(mesh: MeshObject) -> MeshObject:
-    smooth = None if mesh.vertex_normals is None else _flip_x(mesh.vertex_normals)
-    return replace(mesh, vertices=_flip_x(mesh.vertices), normals=_flip_x(mesh.normals), vertex_normals=smooth)
-
-
-def _flip_x(points: FloatArray) -> FloatArray:
-    """Points (..., 3) with x negated; 0 - x, since -x would make -0.0 of 0.0."""
-    flipped = np.array(points)
-    flipped[..., 0] = 0.0 - flipped[..., 0]
-    return flipped
+    smooth = None if mesh.vertex_normals is None else flip_x(mesh.vertex_normals)
+    return replace(mesh, vertices=flip_x(mesh.vertices), normals=flip_x(mesh.normals), vertex_normals=smooth)

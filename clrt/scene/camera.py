@@ -8,7 +8,7 @@ from clrt.scene.faults import Faults
 from clrt.scene.grammar import LETTERS, MOST_PIXELS
 from clrt.scene.model import Camera, FloatArray
 from clrt.scene.text import Declarations
-from clrt.scene.triangles import scaled, unit
+from clrt.scene.triangles import flip_x, scaled, unit
 
 _UP = (0.0, 1.0, 0.0)
 
@@ -30,8 +30,12 @@ _LEAST_SINE = 2e-12
 Line = tuple[int, FloatArray]  #: line number, numbers
 
 
-def build_camera(found: Declarations, faults: Faults) -> Camera | None:
-    """The camera, or None with faults noted: lines missing, repeated or in conflict, or a view without extent."""
+def build_camera(found: Declarations, right_handed: bool, faults: Faults) -> Camera | None:
+    """The camera, or None with faults noted: lines missing, repeated or in conflict, or a view without extent.
+
+    right_handed : turn x round in the lines; the picture's right then follows from the turned view, which is why
+        mirroring the finished camera would not do
+    """
     corners = found.get("O", 12)
     for letter in "EVFR":
         _check_once(found.lines_of(letter).tolist(), letter, found, faults)
@@ -45,13 +49,19 @@ def build_camera(found: Declarations, faults: Faults) -> Camera | None:
     missing = [letter for letter in needed if not _check_present(letter, found, faults)]
 
     used = {letter: _single(letter, found, faults) for letter in "EVFRO"}
-    sound = _check_pixels(used["R"], found, faults) and _check_view(used["V"], found, faults)
+    size_fits, view_has_sides = _check_pixels(used["R"], found, faults), _check_view(used["V"], found, faults)
     eye, view, fov, size, plane = (used[letter] for letter in "EVFRO")
-    if missing or not sound or not eye or not size:
+    if missing or not size_fits or not view_has_sides or not eye or not size:
         return None
+    width, height = size[1].astype(int).tolist()
+    turn = flip_x if right_handed else np.array
     if plane:
-        return _from_corners(plane, eye, size, found, faults)
-    return _from_view(eye, view, fov, size) if view and fov else None
+        rays = _checked_corners(plane, eye, found, faults)
+        return None if rays is None else Camera(turn(eye[1]), turn(rays), width, height)
+    if not view or not fov:
+        return None
+    forward, up = _view_and_up(view[1])
+    return Camera.from_view(turn(eye[1]), turn(forward), turn(up), float(fov[1][0]), width, height)
 
 
 def _check_once(lines: list[int], what: str, found: Declarations, faults: Faults) -> None:
@@ -113,15 +123,9 @@ def _check_view(given: Line | None, found: Declarations, faults: Faults) -> bool
     return False
 
 
-def _from_view(eye: Line, view: Line, fov: Line, size: Line) -> Camera:
-    width, height = size[1].astype(int).tolist()
-    return Camera.from_view(eye[1], *_view_and_up(view[1]), float(fov[1][0]), width, height)
-
-
-def _from_corners(plane: Line, eye: Line, size: Line, found: Declarations, faults: Faults) -> Camera | None:
-    """Corners are points of the scene: UL UR LL LR. Their order and extent are checked."""
+def _checked_corners(plane: Line, eye: Line, found: Declarations, faults: Faults) -> FloatArray | None:
+    """Vectors (4, 3) from the eye to the image corners, given as points of the scene: UL UR LL LR."""
     line, values = plane
-    width, height = size[1].astype(int).tolist()
     corners = values.reshape(4, 3) - eye[1]
     ul, ur, ll, lr = unit(corners)
     upper, lower = float(np.linalg.det([ul, ur, ll])), float(np.linalg.det([lr, ll, ur]))
@@ -133,4 +137,4 @@ def _from_corners(plane: Line, eye: Line, size: Line, found: Declarations, fault
     if message:
         faults.add(line, found.token(line, 1).column, message)
         return None
-    return Camera(eye[1].copy(), corners, width, height)
+    return corners

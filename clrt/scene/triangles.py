@@ -38,6 +38,13 @@ def scaled(vectors: FloatArray) -> FloatArray:
     return result
 
 
+def flip_x(vectors: FloatArray) -> FloatArray:
+    """A copy of vectors (..., 3) with x negated; as 0 - x, since -x would make -0.0 of 0.0."""
+    flipped = np.array(vectors)
+    flipped[..., 0] = 0.0 - flipped[..., 0]
+    return flipped
+
+
 def face_normals(vertices: FloatArray) -> FloatArray:
     """Unit normals (n, 3) of triangles (n, 3, 3) along (v1 - v0) x (v2 - v0); exactly zero where the area is exactly zero.
 

@@ -34,6 +34,7 @@ class WordCall:
 
     name: str
     line: int
+    column: int
     values: Mapping[str, Value]
 
     def number(self, name: str) -> float:
@@ -109,11 +110,11 @@ def read_word(tokens: Sequence[Token], line: int, faults: Faults) -> WordCall | 
         values[declared.name] = _read_value(declared, token, line, faults)
     values |= _read_keys(name, word, tokens[1:], line, faults)
     read = {key: value for key, value in values.items() if value is not None}
-    return WordCall(name, line, read) if len(read) == len(values) else None
+    return WordCall(name, line, tokens[0].column, read) if len(read) == len(values) else None
 
 
 def _read_keys(name: str, word: Word, tokens: Sequence[Token], line: int, faults: Faults) -> dict[str, Value | None]:
-    """The values of the line's key=value tokens; None under each key whose value is at fault."""
+    """The values of the line's key=value tokens; None under each key that is at fault."""
     declared = {f.name: f for f, _ in word.keys}
     values: dict[str, Value | None] = {}
     for token in tokens:
@@ -122,10 +123,12 @@ def _read_keys(name: str, word: Word, tokens: Sequence[Token], line: int, faults
             continue
         key, rest = match[1], Token(match[2], token.column + match.start(2))
         if key in values:
+            values[key] = None
             faults.add(line, token.column, f"the key {shown(key)} stands twice on this line")
         elif key in declared:
             values[key] = _read_value(declared[key], rest, line, faults)
         else:
+            values[key] = None
             listed = ", ".join(declared) or "none"
             faults.add(line, token.column, f"{name} has no key {shown(key)}{did_you_mean(key, declared)} (its keys: {listed})")
     return values
