@@ -85,7 +85,8 @@ def bounces(prims: Primitives, materials: MaterialTable, surface: Surface, stack
     margin = np.where(reflect_weight != 0.0, above_margin, np.inf)
     margin = np.minimum(margin, np.where(glass, np.minimum(np.abs(k) / surface.normal_err, flat_margin), np.inf))
     bend = 2.0 * surface.curvature * surface.pos_err
-    return Bounces(reflected, reflect_weight, surface.dir_err + bend, refracted, refract_weight, surface.normal_err * stretch, behind, margin)
+    return Bounces(reflected, reflect_weight, surface.dir_err + bend,
+                   refracted, refract_weight, surface.normal_err * stretch, behind, margin)  # fmt: skip
 
 
 def _reflect(surface: Surface) -> tuple[FloatArray, FloatArray]:
@@ -128,4 +129,5 @@ def _snell(surface: Surface, normal: FloatArray, ratio: FloatArray) -> tuple[Flo
 
 def _unit(v: FloatArray) -> FloatArray:
     length = np.linalg.norm(v, axis=1, keepdims=True)
-    return np.divide(v, length, where=length > 0.0, out=v.copy())
+    unit: FloatArray = np.divide(v, length, where=length > 0.0, out=v.copy())
+    return unit

@@ -48,7 +48,8 @@ class Rays:
     @property
     def speed(self) -> FloatArray:
         """(m,) length of the direction."""
-        return np.linalg.norm(self.direction, axis=1)
+        length: FloatArray = np.linalg.norm(self.direction, axis=1)
+        return length
 
 
 @dataclass(frozen=True, eq=False)

@@ -92,7 +92,7 @@ class Primitives:
     def same_look(self, p: IndexArray, q: IndexArray) -> BoolArray:
         """(k,) bool: flat triangles of one material and one normal (either sign), so that it makes no difference which is seen."""
         flat = (np.maximum(p, q) < self.triangle_count) & (self.curvature[p] == 0.0) & (self.curvature[q] == 0.0)
-        same = flat & (self.material[p] == self.material[q])
+        same: BoolArray = flat & (self.material[p] == self.material[q])
         rows = np.flatnonzero(same)
         n_p, n_q = self.corner_normals[p[rows], 0], self.corner_normals[q[rows], 0]
         same[rows] = np.abs(np.einsum("ki,ki->k", n_p, n_q)) > 1.0 - 1e-12
@@ -104,12 +104,14 @@ def _face_normals(vertices: FloatArray) -> FloatArray:
     e1, e2 = vertices[:, 1] - vertices[:, 0], vertices[:, 2] - vertices[:, 0]
     normal = np.cross(_scaled(e1), _scaled(e2))
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.divide(normal, length, where=length > 0.0, out=np.zeros_like(normal))
+    unit: FloatArray = np.divide(normal, length, where=length > 0.0, out=np.zeros_like(normal))
+    return unit
 
 
 def _scaled(e: FloatArray) -> FloatArray:
     size = np.abs(e).max(axis=1, keepdims=True)
-    return np.divide(e, size, where=size > 0.0, out=np.zeros_like(e))
+    scaled: FloatArray = np.divide(e, size, where=size > 0.0, out=np.zeros_like(e))
+    return scaled
 
 
 def _curvature(vertices: FloatArray, corner: FloatArray) -> FloatArray:
