@@ -88,7 +88,6 @@ def test_make_with_a_python_that_will_not_do_says_what_is_needed(tmp_path: Path,
     assert not (tmp_path / "venv").exists()
 
 
-@pytest.mark.slow
 def test_wheel_holds_kernels_and_types_and_works_by_itself(tmp_path: Path) -> None:
     pytest.importorskip("hatchling")
     build = [sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "--no-index", "-w", str(tmp_path), str(ROOT)]
