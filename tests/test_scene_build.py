@@ -11,10 +11,13 @@ import pytest
 
 from clrt.errors import SceneError
 from clrt.scene.build import load_scene, parse_scene
+from clrt.scene.grammar import LETTERS
 from clrt.scene.model import Camera, PointLight, Scene
 from clrt.scene.triangles import components, face_normals, unit
+from clrt.scene.words import WORDS
 
 DATA = Path(__file__).parent / "data"
+DOCS = Path(__file__).parents[1] / "docs" / "scene-format.md"
 SHARED = Path(__file__).parents[2] / "shared" / "scenes"
 
 CAMERA = "E 0 0 -1\nV 0 0 1\nF 45\nR 4 4\nL 5 5 -5\n"
@@ -416,3 +419,21 @@ def test_homework_scene_reads_without_warnings(name: str, triangles: int, size: 
     assert np.concatenate([o.vertices for o in scene.objects]).tobytes() == numbers[:, :9].tobytes()
     given = numbers[:, 9:] / np.linalg.norm(numbers[:, 9:], axis=1, keepdims=True)
     np.testing.assert_allclose(np.concatenate([o.normals for o in scene.objects]), given, atol=1e-15)
+
+
+# The documentation
+
+
+def test_examples_of_the_documentation_are_read() -> None:
+    blocks = DOCS.read_text(encoding="utf-8").split("```\n")[1::2]
+    example, corners, words, _ = blocks
+    scene = parse_scene(example)
+    assert ([len(o) for o in scene.objects], len(scene.spheres), len(scene.materials), scene.warnings) == ([2], 1, 2, ())
+    assert parse_scene(corners + "L 0 0 0\n" + MATERIAL + FLAT).camera.corners.tolist() == [[-1, 1, 2], [1, 1, 2], [-1, -1, 2], [1, -1, 2]]
+    assert build(FLAT, words).depth == 10
+
+
+def test_every_letter_and_word_is_documented() -> None:
+    text = DOCS.read_text(encoding="utf-8")
+    assert all(f"\n| `{letter}" in text for letter in LETTERS)
+    assert all(f"\n| `{word} " in text for word in WORDS)
