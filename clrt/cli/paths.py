@@ -17,13 +17,27 @@ _MESHES = {".obj", ".ply", ".stl", ".off", ".gltf", ".glb"}
 
 
 def check_scene(path: Path) -> None:
-    """Raise ClrtError, with the nearest name there is, where `path` is no file."""
-    if path.is_dir():
-        raise ClrtError(f"{path}: this is a folder; give a scene text")
-    if not path.exists():
-        raise ClrtError(_missing(path))
+    """Raise ClrtError where `path` is no scene text: a command misspelt, no file, a mesh."""
+    if not path.exists() and path.parent == Path() and not path.suffix:
+        near = difflib.get_close_matches(str(path), _COMMANDS, 1, 0.7)
+        if near:
+            raise ClrtError(f"no command and no file is called {path}; did you mean `clrt {near[0]}`?")
+    check_input(path)
     if path.suffix.lower() in _MESHES:
         raise ClrtError(f"{path}: this is a mesh; `clrt convert {path} scene.txt` makes a scene of it")
+
+
+def check_input(path: Path) -> None:
+    """Raise ClrtError, with the nearest name there is, where `path` is no file."""
+    if path.is_dir():
+        raise ClrtError(f"{path}: this is a folder, not a file")
+    if path.exists():
+        return
+    if not path.parent.is_dir():
+        raise ClrtError(f"{path}: no such file; there is no folder {path.parent}")
+    files = [entry.name for entry in path.parent.iterdir() if entry.is_file()]
+    near = difflib.get_close_matches(path.name, files, 1, 0.5)
+    raise ClrtError(f"{path}: no such file" + (f"; did you mean {path.parent / near[0]}?" if near else ""))
 
 
 def check_outputs(inputs: Mapping[str, Path], outputs: Mapping[str, Path | None]) -> None:
@@ -37,16 +51,3 @@ def check_outputs(inputs: Mapping[str, Path], outputs: Mapping[str, Path | None]
         if real in taken and (path.is_file() or not path.exists()):
             raise ClrtError(f"{path}: this is the {taken[real]}, too; give the {what} another name")
         taken[real] = what
-
-
-def _missing(path: Path) -> str:
-    """What to say of a file that is not there."""
-    name = str(path)
-    if path.parent == Path() and (near := difflib.get_close_matches(name, _COMMANDS, 1, 0.7)) and not path.suffix:
-        return f"no command and no file is called {name}; did you mean `clrt {near[0]}`?"
-    if not path.parent.is_dir():
-        return f"{name}: no such file; there is no folder {path.parent}"
-    files = [entry.name for entry in path.parent.iterdir() if entry.is_file()]
-    if near := difflib.get_close_matches(path.name, files, 1, 0.5):
-        return f"{name}: no such file; did you mean {path.parent / near[0]}?"
-    return f"{name}: no such file"

@@ -23,8 +23,7 @@ def convert(mesh: Path, scene: Path, smooth: bool) -> None:
 
     The mesh is scaled to fit the view and gets a material and a light.
     """
-    if not mesh.is_file():
-        raise ClrtError(f"{mesh}: no such file")
+    paths.check_input(mesh)
     paths.check_outputs({"mesh": mesh}, {"scene": scene})
     from clrt.convert import convert as convert_mesh
 
