@@ -86,7 +86,8 @@ def vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
     shared = np.ravel(place)[faces]
     corners = vertices[faces]
     ahead = np.roll(corners, -1, axis=1) - corners
-    face_normals = _unit(np.cross(ahead[:, 0], ahead[:, 1]))
+    crossed: NDArray[np.float64] = np.cross(ahead[:, 0], ahead[:, 1])
+    face_normals = _unit(crossed)
     along, back = _unit(ahead), -_unit(np.roll(ahead, 1, axis=1))
     angles = 2.0 * np.arctan2(np.linalg.norm(along - back, axis=-1), np.linalg.norm(along + back, axis=-1))
     weighted = angles[..., None] * face_normals[:, None, :]
@@ -95,7 +96,7 @@ def vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
     fallback = np.zeros((count, 3))
     fallback[shared.ravel()] = np.repeat(face_normals, 3, axis=0)
     smooth = np.where((np.linalg.norm(sums, axis=1) > 1e-9)[:, None], _unit(sums), fallback)
-    normals = np.zeros_like(vertices)
+    normals: NDArray[np.float64] = np.zeros_like(vertices)
     normals[faces.ravel()] = smooth[shared.ravel()]
     return normals
 
@@ -103,7 +104,8 @@ def vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """The vectors at length 1; zero where they are zero."""
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+    unit: NDArray[np.float64] = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+    return unit
 
 
 def _as_array(values: ArrayLike, what: str, name: str) -> NDArray[Any]:

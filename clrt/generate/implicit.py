@@ -204,4 +204,5 @@ def _project(field: Field, points: FloatArray, step: float) -> FloatArray:
     squared = np.maximum(np.sum(gradient**2, axis=1), 0.01)
     move = -(evaluate(field, points) / squared)[:, None] * gradient
     length = np.linalg.norm(move, axis=1, keepdims=True)
-    return points + move * np.minimum(1.0, step / np.maximum(length, 1e-300))
+    projected: FloatArray = points + move * np.minimum(1.0, step / np.maximum(length, 1e-300))
+    return projected

@@ -16,6 +16,7 @@ _ATTEMPTS = 60
 #: the animal fits into this box, whatever the seed: it looks along +x, sits on y = 0, its middle plane is z = 0
 _LO, _SIZE = np.array([-0.80, -0.15, -0.80]), 1.65
 _SMOOTH = 0.06
+_HEAD, _EYE_RADIUS = 2, 0.027
 #: triangles of a mesh of spacing h are about this / h^2; refined in the search
 _COUNT_TIMES_CELL_SQUARED = 8.2
 
@@ -89,7 +90,8 @@ class _Animal:
             # Each scale bends the next finer one, so that no regular pattern shows
             warped = warped + 2.5 * height * waves[[1, 2, 0]]
         # A flat seat: the smooth maximum with the half space y < 0
-        return -_smooth_min(-distance, x[1], _SMOOTH)
+        seated: FloatArray = -_smooth_min(-distance, x[1], _SMOOTH)
+        return seated
 
 
 def _resolved(part: _Part, cell: float) -> _Part:
@@ -113,13 +115,15 @@ def _ellipsoid(part: _Part, x: FloatArray) -> FloatArray:
     reach = np.sqrt(np.sum(local * local, axis=0))
     scaled = local / part.radii[:, None]
     slope = np.sqrt(np.sum(scaled * scaled, axis=0))
-    return reach * (reach - 1.0) / np.maximum(slope, 1e-9)
+    distance: FloatArray = reach * (reach - 1.0) / np.maximum(slope, 1e-9)
+    return distance
 
 
 def _smooth_min(a: FloatArray, b: FloatArray, width: float) -> FloatArray:
     """The lesser of two, rounded off where they differ by less than `width` (polynomial, Quilez 2013)."""
     gap = np.maximum(width - np.abs(a - b), 0.0) / width
-    return np.minimum(a, b) - gap * gap * (width / 4.0)
+    least: FloatArray = np.minimum(a, b) - gap * gap * (width / 4.0)
+    return least
 
 
 def _parts(random: np.random.Generator) -> list[_Part]:
@@ -130,20 +134,20 @@ def _parts(random: np.random.Generator) -> list[_Part]:
         _part((-0.08, 0.33, 0.0), (0.42, 0.31, 0.28), (18.0 + 3.0 * pose[2], 0, 0), 0.10),
         _part((0.20, 0.36, 0.0), (0.20, 0.27, 0.19), (-12, 0, 0), 0.12),
         _part(head, (0.20, 0.155, 0.145), (-12, 0, 0), 0.10),
-        _part(head + (0.145, -0.045, 0.0), (0.095, 0.085, 0.085), (-10, 0, 0), 0.08),
+        _part(head + np.array((0.145, -0.045, 0.0)), (0.095, 0.085, 0.085), (-10, 0, 0), 0.08),
         _part((0.06, 0.13, 0.0), (0.30, 0.14, 0.22), (0, 0, 0), 0.08),
         _part((-0.47, 0.20, 0.0), (0.11, 0.105, 0.10), (0, 0, 0), 0.05),
     ]
     for side, tilt in ((1.0, pose[3]), (-1.0, pose[4])):
         lean = 30.0 + 6.0 * tilt
-        root = head + (-0.09, 0.10, 0.060 * side)
+        root = head + np.array((-0.09, 0.10, 0.060 * side))
         along = _rotation(lean, 24.0 * side, 0.0) @ np.array([0.0, 0.25, 0.0])
         parts += [
             _part((-0.16, 0.20, 0.19 * side), (0.23, 0.21, 0.125), (20, 0, 0), 0.07),
             _part((0.02, 0.045, 0.24 * side), (0.22, 0.07, 0.075), (0, 0, -8 * side), 0.07),
             _part((0.36, 0.16, 0.10 * side), (0.08, 0.20, 0.075), (12, 0, 0), 0.06),
             _part((0.42, 0.045, 0.105 * side), (0.12, 0.06, 0.065), (0, 0, 0), 0.05),
-            _part(head + (0.05, -0.055, 0.085 * side), (0.09, 0.08, 0.07), (0, 0, 0), 0.06),
+            _part(head + np.array((0.05, -0.055, 0.085 * side)), (0.09, 0.08, 0.07), (0, 0, 0), 0.06),
             _part(root + along, (0.060, 0.29, 0.086), (lean, 24.0 * side, 22.0 * side), 0.05),
         ]
     return parts
@@ -160,3 +164,15 @@ def _rotation(about_z: float, about_x: float, about_y: float) -> FloatArray:
     turn_y = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
     rotation: FloatArray = turn_x @ turn_z @ turn_y
     return rotation
+
+
+def eyes(triangles: int, seed: int = 0) -> tuple[FloatArray, float]:
+    """Centers (2, 3) on the coat of `rabbit_like(triangles, seed)`, and a radius, for two spheres to serve as eyes."""
+    head = _parts(np.random.default_rng(seed))[_HEAD]
+    animal = _Animal(seed, float(np.sqrt(_COUNT_TIMES_CELL_SQUARED / triangles)))
+    sides = np.array([[0.42, 0.38, 0.82], [0.42, 0.38, -0.82]])
+    outward = sides @ head.world_from_part.T
+    centers = head.center + (sides * head.radii) @ head.world_from_part.T
+    for _ in range(4):
+        centers = centers - animal(centers)[:, None] * outward
+    return centers - 0.3 * _EYE_RADIUS * outward, _EYE_RADIUS
