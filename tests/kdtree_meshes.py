@@ -1,8 +1,9 @@
-"""Triangles that are easy, hard or degenerate for a kd-tree, and trees laid out by hand."""
+"""Triangles that are easy, hard or degenerate for a kd-tree, and an exact clip to judge by."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ def soup(n: int = 400, size: float = 0.3, seed: int = 1) -> F64:
 def sphere(bands: int = 24) -> F64:
     """A closed sphere of 2 * bands * (bands - 1) triangles around (0.3, -0.2, 0.1), zero-area triangles at the poles left out."""
     theta, phi = np.meshgrid(np.linspace(0, np.pi, bands + 1), np.linspace(0, 2 * np.pi, bands + 1), indexing="ij")
-    points = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1) + [0.3, -0.2, 0.1]
+    points = np.stack([np.sin(theta) * np.cos(phi), np.cos(theta), np.sin(theta) * np.sin(phi)], axis=-1) + np.array([0.3, -0.2, 0.1])
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
     lower, upper = np.stack([a, b, c], axis=2)[:-1], np.stack([a, c, d], axis=2)[1:]
     return np.concatenate([lower.reshape(-1, 3, 3), upper.reshape(-1, 3, 3)])
@@ -88,7 +89,7 @@ MESHES: dict[str, Callable[[], F64]] = {
     "soup": soup,
     "dense soup": lambda: soup(200, 1.0),
     "sphere": sphere,
-    "sphere at 1e6": lambda: sphere() + [1e6, -1e6, 1e6],
+    "sphere at 1e6": lambda: sphere() + np.array([1e6, -1e6, 1e6]),
     "sphere of 1e-30": lambda: sphere() * 1e-30,
     "sphere of 1e30": lambda: sphere() * 1e30,
     "sphere of 1e-200": lambda: sphere(8) * 1e-200,
@@ -106,6 +107,25 @@ MESHES: dict[str, Callable[[], F64]] = {
     "neighbours": neighbours,
     "large and small": large_and_small,
 }
+
+
+def exact_bounds(triangle: F64, lo: F64, hi: F64) -> tuple[list[Fraction], list[Fraction]] | None:
+    """Bounds of the part of a triangle in a box, exactly; None if they do not meet."""
+    polygon = [[Fraction(float(x)) for x in corner] for corner in triangle]
+    for axis in range(3):
+        for bound, sign in ((lo, 1), (hi, -1)):
+            plane = Fraction(float(bound[axis]))
+            kept = []
+            for here, there in zip(polygon, polygon[1:] + polygon[:1], strict=True):
+                a, b = sign * (here[axis] - plane), sign * (there[axis] - plane)
+                if a >= 0:
+                    kept.append(here)
+                if a * b < 0:
+                    kept.append([x + (y - x) * (a / (a - b)) for x, y in zip(here, there, strict=True)])
+            polygon = kept
+            if not polygon:
+                return None
+    return [min(c) for c in zip(*polygon, strict=True)], [max(c) for c in zip(*polygon, strict=True)]
 
 
 def read_objects(path: Path) -> list[F64]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from kdtree_meshes import MESHES, F64, lattice, read_objects, soup, sphere
+from kdtree_meshes import F64, MESHES, lattice, read_objects, soup, sphere
 
 from clrt.errors import LimitError, MeshError
 from clrt.kdtree import BUILDERS, LEAF, KdTree, build_tree, default_max_depth
@@ -88,7 +88,7 @@ def test_sah_is_cheaper_than_median_by_its_own_measure() -> None:
 
 def test_sah_cuts_empty_space_off() -> None:
     small = soup(100, 0.001)
-    far = small + [1000.0, 0, 0]
+    far = small + np.array([1000.0, 0, 0])
     tree = build_tree(np.concatenate([small, far]), "sah")
     lo, hi = tree.cells()
     filled = (tree.split_axis == LEAF) & (tree.count > 0)
@@ -171,7 +171,7 @@ def test_vertices_that_are_no_numbers_are_refused() -> None:
 
 
 def test_unknown_builder_and_depth_out_of_range_are_refused() -> None:
-    with pytest.raises(ValueError, match="median, sah|sah, median"):
+    with pytest.raises(ValueError, match="choose one of sah, median"):
         build_tree(soup(), "bvh")
     for depth in (-1, 61):
         with pytest.raises(LimitError, match="0 to 60"):
