@@ -68,8 +68,8 @@ def _light_caller(scene: Scene) -> int | None:
 
 
 def _shadow_caller(scene: Scene) -> int | None:
-    """A light, and two primitives: one alone cannot stand in its own way."""
-    return _light_caller(scene) if scene.triangle_count + len(scene.spheres) > 1 else None
+    """A light, and something that can stand in its way: a lone triangle cannot shadow itself, a sphere can from inside."""
+    return _light_caller(scene) if scene.triangle_count > 1 or len(scene.spheres) else None
 
 
 def _bounce_caller(scene: Scene) -> int | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -64,13 +65,13 @@ def render(
     features = Features.of(scene)
     prepared = build_trees(scene, tree, tell)
     build_end = time.perf_counter()
-    buffers, tracer, source, upload_s = _open(prepared, features, ladder, opened, tell)
+    buffers, tracer, source, upload_s = open_tracer(prepared, features, ladder, opened, tell)
     compile_s = time.perf_counter() - build_end - upload_s
     if dump_kernel is not None:
         with atomic_write(dump_kernel) as file:
             file.write(source.encode())
     before = time.perf_counter()
-    _run(tracer, "render", tell)
+    run_rows(tracer, "render", tell)
     pixels = tracer.picture()
     end = time.perf_counter()
     stats = RunStats(
@@ -107,10 +108,14 @@ def build_trees(scene: Scene, tree: str, tell: Progress) -> Prepared:
         tell("trees", done / total)
         share = len(item) / total
         start = time.perf_counter()
-        trees.append(build_tree(item.vertices - origin, tree, progress=lambda f, d=done / total, s=share: tell("trees", d + s * f)))
+        trees.append(build_tree(item.vertices - origin, tree, progress=partial(_tell_share, tell, done / total, share)))
         seconds.append(time.perf_counter() - start)
         done += len(item)
     return Prepared(scene, tuple(trees), tuple(seconds))
+
+
+def _tell_share(tell: Progress, done: float, share: float, fraction: float) -> None:
+    tell("trees", done + share * fraction)
 
 
 def _shape(prepared: Prepared, features: Features, shared_lights: bool) -> program.Shape:
@@ -119,7 +124,7 @@ def _shape(prepared: Prepared, features: Features, shared_lights: bool) -> progr
     return program.Shape(program.stack_size(deepest), prepared.scene.depth if bounces else 0, shared_lights)
 
 
-def _open(
+def open_tracer(
     prepared: Prepared, features: Features, precision: Precision, device: Device, tell: Progress
 ) -> tuple[Buffers, Tracer, str, float]:
     """Buffers filled and program built; also its source, and the seconds of packing, upload and preparing."""
@@ -139,7 +144,7 @@ def _open(
     return buffers, tracer, source, upload_s + time.perf_counter() - start
 
 
-def _run(tracer: Tracer, phase: str, tell: Progress) -> None:
+def run_rows(tracer: Tracer, phase: str, tell: Progress) -> None:
     """All rows, in launches of about _LAUNCH_S each; Python sees signals between them."""
     scene = tracer.buffers.packed.scene
     bounces = any(f.name == "bounce" for f in tracer.buffers.features.active)
@@ -174,7 +179,7 @@ def _count(buffers: Buffers, stats: RunStats, tell: Progress) -> None:
     bounces = any(f.name == "bounce" for f in buffers.features.active)
     shape = program.Shape(program.stack_size(stats.depth), buffers.packed.scene.depth if bounces else 0, buffers.shared_lights)
     tracer = Tracer(buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True)
-    _run(tracer, "count", tell)
+    run_rows(tracer, "count", tell)
     kinds = buffers.features.ray_kinds
     stats.ray_counts = {kind: int(n) for kind, n in zip(kinds, tracer.counts, strict=False)}
     rays = max(1, sum(stats.ray_counts.values()))

@@ -34,7 +34,7 @@ inline Bounce *bounce_push(BounceStack *stack, const Hit *hit, const real_n *dir
 }
 
 // Takes the next packet off the stack; 0 where none waits.
-inline int bounce_pop(BounceStack *stack, Bounce *current, Rays *rays) {
+inline int bounce_pop(BounceStack *stack, Bounce *current, real extent, Rays *rays) {
     if (stack->count == 0) return 0;
     *current = stack->entry[--stack->count];
     for (int a = 0; a < 3; a++) {
@@ -44,7 +44,7 @@ inline int bounce_pop(BounceStack *stack, Bounce *current, Rays *rays) {
     rays->t_min = (real_n)0;
     rays->skip = current->skip;
     rays->active = current->active;
-    rays_prepare(rays);
+    rays_prepare(rays, extent);
     return 1;
 }
 
@@ -79,6 +79,6 @@ inline void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction
         }
 //@end
 //@hook next
-        if (!bounce_pop(&bounces, &current, &rays)) break;
+        if (!bounce_pop(&bounces, &current, frame->extent, &rays)) break;
         weight = current.weight;
 //@end

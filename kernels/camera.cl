@@ -19,5 +19,5 @@ inline void camera_rays(global const Frame *frame, int column, int row, Rays *ra
     for (int a = 0; a < 3; a++) rays->direction[a] *= scale;
     rays->t_min = (real_n)0;
     rays->skip = (mask_n)-1;
-    rays_prepare(rays);
+    rays_prepare(rays, R(0.0));
 }

@@ -8,6 +8,7 @@ typedef struct {
     real_n inverse[3];    // 1 / direction, bounded by HUGE_INVERSE so that no product with a finite distance is NaN
     real_n t_min;
     mask_n octant;        // bit a set: the direction's component a is negative
+    real_n scale;         // |origin|, plus the extent of the scene where corners are rounded: what distances inherit errors from
     mask_n skip;          // a triangle slot each ray passes by (the one it starts on or ends at), or -1
     mask_n active;
 } Rays;
@@ -20,8 +21,10 @@ typedef struct {
 } Hits;
 
 // Fills what follows from origin and direction; lanes with a NaN or an infinity become inactive: they hit nothing.
-inline void rays_prepare(Rays *rays) {
+// `corner_extent` bounds the coordinates of the corners that distances are computed from in `real`; 0 for rays of a shared origin.
+inline void rays_prepare(Rays *rays, real corner_extent) {
     rays->octant = NO_LANES;
+    rays->scale = abs_n(rays->origin[0]) + abs_n(rays->origin[1]) + abs_n(rays->origin[2]) + (real_n)corner_extent;
     for (int a = 0; a < 3; a++) {
         const real_n d = rays->direction[a];
         const mask_n negative = is_less(d, (real_n)0);

@@ -10,17 +10,29 @@ inline void media_begin(Media *media) {
     for (int k = 0; k < LANES; k++) media->count[k] = 0;
 }
 
+// Snell's law, ratio = n1 / n2: d' = r d + (r c - sqrt(k)) n with c = -d.n, k = 1 - r^2 (1 - c^2), and 1 - c^2 from the cross product,
+// which keeps its digits near normal incidence. Gives 1, 0 for total reflection, -1 where n faces away.
+inline int refraction_snell(const real *d, const real *n, real ratio, real *turned) {
+    const real x = d[1] * n[2] - d[2] * n[1], y = d[2] * n[0] - d[0] * n[2], z = d[0] * n[1] - d[1] * n[0];
+    const real c = -(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]), rest = R(1.0) - ratio * ratio * (x * x + y * y + z * z);
+    if (c <= R(0.0)) return -1;
+    if (rest < R(0.0)) return 0;
+    for (int a = 0; a < 3; a++) turned[a] = ratio * d[a] + (ratio * c - sqrt(rest)) * n[a];
+    return 1;
+}
+
 // For each lane with Refract > 0: the refracted direction and the media behind the surface; its weight; or the weight that total
 // internal reflection hands to the reflected ray. A hit on an object that the ray is inside of leaves it, any other enters.
 inline void refraction_turn(global const Material *materials, global const Surface *surfaces, int triangle_slots, int object_count,
                             const Rays *rays, const Hit *hit, const Media *before, real_n *direction, Media *after, real_n *weight,
                             real_n *reflected) {
-    real d[3][LANES], n[3][LANES], through[LANES], back[LANES];
+    real d[3][LANES], n[3][LANES], g[3][LANES], through[LANES], back[LANES];
     lane_int found[LANES];
     store_lanes(hit->found, found);
     for (int a = 0; a < 3; a++) {
         store_lanes(rays->direction[a], d[a]);
         store_lanes(hit->normal[a], n[a]);
+        store_lanes(hit->geometric[a], g[a]);
     }
     *after = *before;
     for (int k = 0; k < LANES; k++) {
@@ -47,17 +59,19 @@ inline void refraction_turn(global const Material *materials, global const Surfa
             after->ior[count][k] = to;
             after->count[k] = count + 1;
         }
-        // Snell: d' = r d + (r c - sqrt(1 - r^2 (1 - c^2))) n with c = -d.n and 1 - c^2 from the cross product, exact near 1.
-        const real cx = d[1][k] * n[2][k] - d[2][k] * n[1][k], cy = d[2][k] * n[0][k] - d[0][k] * n[2][k];
-        const real cz = d[0][k] * n[1][k] - d[1][k] * n[0][k], ratio = from / to;
-        const real c = -(d[0][k] * n[0][k] + d[1][k] * n[1][k] + d[2][k] * n[2][k]);
-        const real inside = R(1.0) - ratio * ratio * (cx * cx + cy * cy + cz * cz);
-        if (inside < R(0.0)) {
+        // About the shading normal, or about the true one where that would not lead behind the surface.
+        const real incoming[3] = {d[0][k], d[1][k], d[2][k]}, shading[3] = {n[0][k], n[1][k], n[2][k]};
+        const real surface[3] = {g[0][k], g[1][k], g[2][k]};
+        real turned[3];
+        int passes = refraction_snell(incoming, shading, from / to, turned);
+        if (passes < 0 || (passes > 0 && turned[0] * surface[0] + turned[1] * surface[1] + turned[2] * surface[2] >= R(0.0)))
+            passes = refraction_snell(incoming, surface, from / to, turned);
+        if (passes <= 0) {
             back[k] = refract;
             continue;
         }
         through[k] = refract;
-        for (int a = 0; a < 3; a++) d[a][k] = ratio * d[a][k] + (ratio * c - sqrt(inside)) * n[a][k];
+        for (int a = 0; a < 3; a++) d[a][k] = turned[a];
     }
     for (int a = 0; a < 3; a++) direction[a] = load_lanes(d[a]);
     normalize_n(direction);

@@ -23,7 +23,7 @@ inline mask_n shadow_lit(const Geometry *geometry, global const Light *light, in
     rays.t_min = offset;
     rays.active = lit;
     rays.skip = load_lanes(hit->slot);
-    rays_prepare(&rays);
+    rays_prepare(&rays, R(0.0));
     Hits hits;
     hits.t = length;
     hits.slot = (mask_n)-1;

@@ -5,8 +5,9 @@
 // the discriminant from the point nearest the centre, r^2 - |f - (f.d) d|^2, keeps its digits at any distance; the roots as
 // q = -(b + sign(b) sqrt(disc)) and c / q lose none where b^2 is near the discriminant.
 
-// Sphere k of the scene has the slot triangle_slots + k. A ray that starts on a sphere meets that one at its second root only
-// (t = -2 f.d, inwards); one that ends on it passes it by (any_hit).
+// Sphere k of the scene has the slot slot_count + k. A ray that starts on a sphere meets that one at its second root only
+// (t = -2 f.d, inwards). A ray that ends on it (any_hit) leaves out the root at its end, and may meet the other: the far wall,
+// where the end is seen from inside.
 inline void sphere_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
     for (int i = 0; i < geometry->sphere_count; i++) {
         global const Sphere *sphere = geometry->spheres + i;
@@ -23,7 +24,8 @@ inline void sphere_trace(const Geometry *geometry, const Rays *rays, const int a
         const real_n q = b + choose(is_less(b, (real_n)0), -root, root);
         const real_n first = min_n(product / q, q), second = max_n(product / q, q);
         real_n t = choose(is_greater(first, rays->t_min), first, second);
-        t = choose(own, any_hit ? (real_n)-1 : R(2.0) * b, t);
+        if (any_hit) t = choose(own, choose(is_less(abs_n(first - hits->t), abs_n(second - hits->t)), second, first), t);
+        else t = choose(own, R(2.0) * b, t);
         const mask_n hit = meets & is_greater(t, rays->t_min) & is_less(t, hits->t);
         hits->t = choose(hit, t, hits->t);
         hits->slot = choose(hit, (mask_n)(geometry->slot_count + i), hits->slot);

@@ -14,7 +14,8 @@ from clrt.features import REAL
 def _offsets_on_device(device: Device, name: str, dtype: np.dtype[np.void]) -> list[int]:
     members = dtype.names or ()
     lines = [f"out[{i}] = (int)((size_t)&one.{m} - (size_t)&one);" for i, m in enumerate(members)]
-    source = layout.c_struct(name, dtype) + f"kernel void f(global int *out) {{ {name} one; {' '.join(lines)} out[{len(members)}] = sizeof({name}); }}"
+    body = f"{name} one; {' '.join(lines)} out[{len(members)}] = sizeof({name});"
+    source = layout.c_struct(name, dtype) + f"kernel void f(global int *out) {{ {body} }}"
     built = program.build(device, source)
     out = np.zeros(len(members) + 1, np.int32)
     buffer = cl.Buffer(device.context, cl.mem_flags.WRITE_ONLY, out.nbytes)

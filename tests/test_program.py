@@ -34,7 +34,8 @@ def _features(*names: str) -> Features:
 
 
 def _traces(feature: Feature, source: str) -> list[str]:
-    words = [feature.kernel, *WORDS[feature.name], *(n for n, _ in feature.parameters), *(f" {n};" for n, *_ in feature.material + feature.frame)]
+    members = [f" {name};" for name, *_ in feature.material + feature.frame]
+    words = [feature.kernel, *WORDS[feature.name], *(name for name, _ in feature.parameters), *members]
     return [w for w in words if w.lower() in source.lower()]
 
 
@@ -81,7 +82,9 @@ def test_line_directives_are_true(device: Device) -> None:
 
 @pytest.mark.parametrize("names", list(itertools.combinations([f.name for f in FEATURES if f.name != "bounce"], 2)))
 def test_pairs_of_effects_compile_for_any_width(device: Device, names: tuple[str, str]) -> None:
-    wanted = {*names} | ({"bounce"} if {"mirror", "refraction"} & set(names) else set()) | ({"direct light"} if "shadows" in names else set())
+    wanted = {*names}
+    wanted |= {"bounce"} if {"mirror", "refraction"} & wanted else set()
+    wanted |= {"direct light"} if "shadows" in wanted else set()
     lanes = {0: 16, 1: 8, 2: 4, 3: 1}[sum(map(ord, "".join(names))) % 4]
     program.build(device, program.compose(_features(*wanted), rung("watertight"), lanes, SHAPE))
 

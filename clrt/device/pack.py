@@ -67,7 +67,7 @@ def unit_normals(vertices: FloatArray) -> FloatArray:
         np.divide(e, size, out=e, where=size > 0)
     normal = np.cross(e1, e2)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    return np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    return np.asarray(np.divide(normal, length, out=np.zeros_like(normal), where=length > 0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from typing import Any
 from clrt.errors import DeviceError
 
 #: (instruction sets as /proc/cpuinfo names them, processor as LLVM names it), best first: the variants of PoCL's kernel library
-_PROCESSORS = (
+_PROCESSORS: tuple[tuple[set[str], str], ...] = (
     ({"avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512cd"}, "skylake-avx512"),
     ({"avx2", "fma", "bmi1", "bmi2", "movbe"}, "haswell"),
     ({"avx", "fma4"}, "bdver1"),

@@ -93,7 +93,7 @@ class Tracer:
         self.kernel = cl.Kernel(built, "render")
         self.counters = np.zeros(len(buffers.features.ray_kinds) + len(scene.objects), np.uint32)
         self.counts = np.zeros(len(self.counters), np.int64)
-        self._counter_buffer = buffers.empty(self.counters.nbytes) if counting else None
+        self._counter_buffer: Any = buffers.empty(self.counters.nbytes) if counting else None
         nodes, indices, objects, surfaces, materials = buffers.core
         self._before = (buffers.frame, nodes, indices, buffers.triangles, buffers.eye_planes, buffers.vertices, objects, surfaces, materials)
         self._after = (self.film, *(buffers.effects[name] for f in buffers.features.active for name, _ in f.parameters))

@@ -68,7 +68,7 @@ class Camera:
         t = ((np.arange(self.height) + 0.5) / self.height)[:, None, None]
         ul, ur, ll, lr = self.corners
         d = (1 - s) * (1 - t) * ul + s * (1 - t) * ur + (1 - s) * t * ll + s * t * lr
-        return d / np.linalg.norm(d, axis=-1, keepdims=True)
+        return np.asarray(d / np.linalg.norm(d, axis=-1, keepdims=True))
 
 
 @dataclass(frozen=True)
