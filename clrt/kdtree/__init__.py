@@ -4,6 +4,7 @@
     validate.py     the proof that a tree is right: structure here, triangles in coverage.py, by overlap.py alone
     sah.py          the default builder: surface area heuristic (binning.py), clipped references (clip.py)
     median.py       the report's splitter
+    brute.py        one leaf for all: what the others are measured against
     common.py       what builders share: checked input, rounding, the writer of a tree
 """
 
@@ -14,12 +15,13 @@ from typing import Protocol
 from numpy.typing import ArrayLike
 
 from clrt.errors import LimitError
+from clrt.kdtree.brute import build_brute
 from clrt.kdtree.common import DEPTH_CAP, F64, Progress, checked_vertices, default_max_depth
 from clrt.kdtree.median import build_median
 from clrt.kdtree.sah import build_sah
 from clrt.kdtree.tree import LEAF, KdTree
 
-__all__ = ["BUILDERS", "DEPTH_CAP", "LEAF", "Builder", "KdTree", "build_tree", "default_max_depth"]
+__all__ = ["BASELINES", "BUILDERS", "DEPTH_CAP", "LEAF", "Builder", "KdTree", "build_tree", "default_max_depth"]
 
 
 class Builder(Protocol):
@@ -30,6 +32,9 @@ class Builder(Protocol):
 
 #: Builders by name; add one here and it is offered everywhere.
 BUILDERS: dict[str, Builder] = {"sah": build_sah, "median": build_median}
+
+#: Also understood by `build_tree`, but offered nowhere: what builders are measured against.
+BASELINES: dict[str, Builder] = {"brute": build_brute}
 
 
 def build_tree(
@@ -43,10 +48,11 @@ def build_tree(
 
     Raises MeshError for vertices that are not finite, LimitError for a depth out of range, ValueError for an unknown builder.
     """
-    if builder not in BUILDERS:
+    known = BUILDERS | BASELINES
+    if builder not in known:
         raise ValueError(f"no kd-tree builder {builder!r}; choose one of {', '.join(BUILDERS)}")
     corners = checked_vertices(vertices)
     limit = default_max_depth(len(corners)) if max_depth is None else max_depth
     if not 0 <= limit <= DEPTH_CAP:
         raise LimitError(f"kd-tree depth limit {limit} is out of range; choose 0 to {DEPTH_CAP}")
-    return BUILDERS[builder](corners, limit, progress)
+    return known[builder](corners, limit, progress)
