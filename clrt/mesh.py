@@ -85,14 +85,14 @@ def vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> N
     _, place = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     shared = np.ravel(place)[faces]
     corners = vertices[faces]
-    ahead = np.roll(corners, -1, axis=1) - corners
-    crossed: NDArray[np.float64] = np.cross(ahead[:, 0], ahead[:, 1])
-    face_normals = _unit(crossed)
+    ahead: NDArray[np.float64] = np.roll(corners, -1, axis=1) - corners
+    face_normals = _unit(np.asarray(np.cross(ahead[:, 0], ahead[:, 1]), np.float64))
     along, back = _unit(ahead), -_unit(np.roll(ahead, 1, axis=1))
     angles = 2.0 * np.arctan2(np.linalg.norm(along - back, axis=-1), np.linalg.norm(along + back, axis=-1))
     weighted = angles[..., None] * face_normals[:, None, :]
     count = int(shared.max()) + 1
-    sums = np.stack([np.bincount(shared.ravel(), weighted[..., axis].ravel(), count) for axis in range(3)], axis=1)
+    sums = np.zeros((count, 3))
+    np.add.at(sums, shared.ravel(), weighted.reshape(-1, 3))
     fallback = np.zeros((count, 3))
     fallback[shared.ravel()] = np.repeat(face_normals, 3, axis=0)
     smooth = np.where((np.linalg.norm(sums, axis=1) > 1e-9)[:, None], _unit(sums), fallback)

@@ -82,10 +82,12 @@ def relax(field: Field, vertices: FloatArray, quads: IndexArray, step: float, ro
     return _project(field, vertices, step)
 
 
-def split_quads(vertices: FloatArray, quads: IndexArray) -> IndexArray:
-    """Two triangles a quad, along its shorter diagonal: (2m, 3)."""
+def split_quads(field: Field, vertices: FloatArray, quads: IndexArray) -> IndexArray:
+    """Two triangles a quad, (2m, 3), along the diagonal whose middle lies nearer to the surface: edges follow ridges."""
     a, b, c, d = quads.T
-    first = np.linalg.norm(vertices[a] - vertices[c], axis=1) <= np.linalg.norm(vertices[b] - vertices[d], axis=1)
+    off_ac = np.abs(evaluate(field, 0.5 * (vertices[a] + vertices[c])))
+    off_bd = np.abs(evaluate(field, 0.5 * (vertices[b] + vertices[d])))
+    first = off_ac <= off_bd
     upper = np.where(first[:, None], np.stack([a, b, c], axis=1), np.stack([a, b, d], axis=1))
     lower = np.where(first[:, None], np.stack([a, c, d], axis=1), np.stack([b, c, d], axis=1))
     return np.stack([upper, lower], axis=1).reshape(-1, 3)

@@ -13,6 +13,8 @@ SMALLEST, LARGEST = 1_000, 4_000_000
 _TOLERANCE = 0.02
 #: lattices tried: the count varies by some percent with their place, and at small counts a gap may close to a handle
 _ATTEMPTS = 60
+#: of relaxation
+_ROUNDS = 6
 #: the animal fits into this box, whatever the seed: it looks along +x, sits on y = 0, its middle plane is z = 0
 _LO, _SIZE = np.array([-0.80, -0.15, -0.80]), 1.65
 _SMOOTH = 0.06
@@ -66,8 +68,9 @@ def _measured_constant(triangles: int, seed: int, guess: float) -> float:
 
 
 def _finished(seed: int, cell: float, vertices: FloatArray, quads: IndexArray) -> tuple[FloatArray, IndexArray]:
-    vertices = np.round(relax(_Animal(seed, cell), vertices, quads, 0.25 * cell, rounds=4), 6)
-    return vertices, split_quads(vertices, quads)
+    animal = _Animal(seed, cell)
+    vertices = np.round(relax(animal, vertices, quads, 0.25 * cell, rounds=_ROUNDS), 6)
+    return vertices, split_quads(animal, vertices, quads)
 
 
 class _Animal:
