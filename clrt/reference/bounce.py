@@ -56,8 +56,9 @@ class MediumStack:
 
 @dataclass(frozen=True, eq=False)
 class Bounces:
-    """For m hits: reflected and refracted directions (m, 3) unit, their weights (m,) relative to the hit's, errors, and the stack behind.
+    """For m hits: reflected and refracted directions (m, 3) unit, their weights (m,) relative to the hit's, and the stack behind.
 
+    reflect_err, refract_err : (2, m) pos_err and dir_err of those rays, see Rays
     margin : (m,) how far the choice of normals and of total reflection is from another
     """
 
@@ -84,9 +85,15 @@ def bounces(prims: Primitives, materials: MaterialTable, surface: Surface, stack
     reflected, above_margin = _reflect(surface)
     margin = np.where(reflect_weight != 0.0, above_margin, np.inf)
     margin = np.minimum(margin, np.where(glass, np.minimum(np.abs(k) / surface.normal_err, flat_margin), np.inf))
-    bend = 2.0 * surface.curvature * surface.pos_err
-    return Bounces(reflected, reflect_weight, surface.dir_err + bend,
-                   refracted, refract_weight, surface.normal_err * stretch, behind, margin)  # fmt: skip
+    turn = surface.curvature * surface.pos_err
+    reflect_err = np.stack([_across(surface, reflected), surface.dir_err + 2.0 * turn])
+    refract_err = np.stack([_across(surface, refracted), surface.dir_err * np.maximum(stretch, 1.0) + turn * np.abs(stretch - 1.0)])
+    return Bounces(reflected, reflect_weight, reflect_err, refracted, refract_weight, refract_err, behind, margin)
+
+
+def _across(surface: Surface, direction: FloatArray) -> FloatArray:
+    """(m,) the hit's error as seen across a ray that leaves it: slanted as it arrives, the ray hides what the slant has added."""
+    return np.maximum(surface.spread_err, surface.pos_err * np.abs(dot(direction, surface.n_geo)))
 
 
 def _reflect(surface: Surface) -> tuple[FloatArray, FloatArray]:
@@ -101,7 +108,7 @@ def _reflect(surface: Surface) -> tuple[FloatArray, FloatArray]:
 
 def _refract(surface: Surface, ratio: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Refracted directions, k = cos^2 of the refracted angle (negative: total reflection), the margin of the choice of normal,
-    and how much the angle's error grows.
+    and the derivative of the refracted by the incident angle.
 
     About the shading normal; about the geometric one where the shading normal faces away from the viewer, or where the refracted ray
     would stay on the viewer's side.
@@ -114,7 +121,7 @@ def _refract(surface: Surface, ratio: FloatArray) -> tuple[FloatArray, FloatArra
     margin = np.where(surface.curvature > 0.0, choice / surface.normal_err, np.inf)
     k = np.where(use_geo, k_geo, k_shade)
     cos_in = np.abs(np.where(use_geo, dot(surface.view, surface.n_geo), facing))
-    stretch = np.maximum(1.0, ratio * cos_in / np.sqrt(np.maximum(k, 1e-6)))
+    stretch = ratio * cos_in / np.sqrt(np.maximum(k, 1e-6))
     return np.where(use_geo[:, None], about_geo, about_shade), k, margin, stretch
 
 

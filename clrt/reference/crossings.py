@@ -26,7 +26,7 @@ IndexArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 BAND = 1e-3  #: closeness up to this is measured; what is farther may go unseen
-BAND_CAP = 0.05  #: no wider search than this, in radians, however much a path magnifies errors
+BAND_CAP = 0.02  #: no wider search than this, in radians, however much a path magnifies errors
 ERROR = SAFETY * LINE_ERROR
 NOISE = 64.0 * UNIT_ROUNDOFF  #: of a hit point: a few roundings of t, of o + t d, each relative to coordinates and path
 

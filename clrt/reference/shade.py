@@ -25,7 +25,8 @@ class Surface:
 
     point : (m, 3); prim : (m,); material : (m,)
     view : (m, 3) unit, towards the viewer; n_geo : (m, 3) unit, on the viewer's side; n_shade : (m, 3) unit, on n_geo's side
-    curvature : (m,) 1 / length; pos_err : (m,) length, dir_err : (m,) as for Rays, at the hit
+    curvature : (m,) 1 / length; dir_err : (m,) of the arriving ray; errors of the hit: across the ray spread_err (m,), along the
+        surface pos_err (m,), greater where the ray is slanted
     margin : (m,) how far the choice of sides is from another
     """
 
@@ -36,6 +37,7 @@ class Surface:
     n_geo: FloatArray
     n_shade: FloatArray
     curvature: FloatArray
+    spread_err: FloatArray
     pos_err: FloatArray
     dir_err: FloatArray
     margin: FloatArray
@@ -70,7 +72,7 @@ def surfaces(prims: Primitives, rays: Rays, prim: IndexArray, t: FloatArray) -> 
     spread = rays.pos_err + t * rays.speed * rays.dir_err
     pos_err = spread / np.maximum(-dot(n_geo, unit), STEEPEST)
     margin = np.where(curvature > 0.0, np.abs(agreement) / (1.0 + curvature * pos_err), np.inf)
-    return Surface(point, prim, prims.material[prim], -unit, n_geo, n_shade, curvature, pos_err, rays.dir_err, margin)
+    return Surface(point, prim, prims.material[prim], -unit, n_geo, n_shade, curvature, spread, pos_err, rays.dir_err, margin)
 
 
 def _interpolated(prims: Primitives, tri: IndexArray, origin: FloatArray, direction: FloatArray) -> FloatArray:

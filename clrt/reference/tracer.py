@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from clrt.errors import SceneError
 from clrt.reference.bounce import MediumStack, bounces
-from clrt.reference.crossings import Rays
+from clrt.reference.crossings import BAND, Rays
 from clrt.reference.geometry import MaterialTable, Primitives
 from clrt.reference.lines import TILE_BYTES
 from clrt.reference.shade import Surface, local_color, surfaces
@@ -33,8 +33,7 @@ class ReferencePicture:
     prim_id : (h, w) int64, the primitive each primary ray hits first, -1 for none
     t : (h, w) float64, where: eye + t * direction, direction as given; inf for none
     margin : (h, w) float64, the smallest distance to a flipped decision over all rays of the pixel, in relative errors: rounding with a
-        unit roundoff well below it (say by a factor of 100) cannot change what the pixel's rays hit. Measured up to about 1e-3; what is
-        greater, inf included, only means far.
+        unit roundoff well below it (say by a factor of 100) cannot change what the pixel's rays hit. inf: above BAND = 1e-3
     rays : how many rays were traced, by kind: primary, shadow, reflected, refracted
     """
 
@@ -91,6 +90,7 @@ def render(scene: Scene, *, directions: FloatArray | None = None, chunk_bytes: i
             if not len(wave.pixel):
                 break
     shape = (height, width)
+    picture.margin[picture.margin > BAND] = np.inf
     return ReferencePicture(picture.pixels.reshape(*shape, 3), picture.prim_id.reshape(shape), picture.t.reshape(shape),
                             picture.margin.reshape(shape), picture.rays)  # fmt: skip
 
@@ -136,9 +136,9 @@ def _next(world: _World, wave: _Wave, surface: Surface, picture: ReferencePictur
     picture.rays["refracted"] += len(down)
     both = np.concatenate([up, down])
     direction = np.concatenate([b.reflected[up], b.refracted[down]])
-    dir_err = np.concatenate([b.reflect_err[up], b.refract_err[down]])
+    pos_err, dir_err = np.concatenate([b.reflect_err[:, up], b.refract_err[:, down]], axis=1)
     weight = wave.weight[both] * np.concatenate([b.reflect_weight[up], b.refract_weight[down]])
     above, behind = wave.stack[up], b.behind[down]
     stack = MediumStack(*(np.concatenate([getattr(above, n), getattr(behind, n)]) for n in ("object", "ior", "count")))
-    rays = Rays(surface.point[both], direction, surface.prim[both], surface.pos_err[both], dir_err)
+    rays = Rays(surface.point[both], direction, surface.prim[both], pos_err, dir_err)
     return _Wave(rays, weight, wave.pixel[both], stack)
