@@ -39,7 +39,7 @@ def lattice(cells: int = 4, step: float = 1.0) -> F64:
         corners[:, :, b] = row[:, None] + [0, 1, 1, 0]
         corners[:, :, c] = column[:, None] + [0, 0, 1, 1]
         faces += [corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]]
-    return np.concatenate(faces) * step
+    return np.array(np.concatenate(faces) * step, np.float64)
 
 
 def needles(n: int = 300, ratio: float = 1e6, seed: int = 2) -> F64:
@@ -61,20 +61,26 @@ def flat_sheet(n: int = 500, height: float = 0.3, seed: int = 3) -> F64:
 
 def collinear(n: int = 100, seed: int = 4) -> F64:
     """Triangles of exactly zero area along one line."""
-    t = np.random.default_rng(seed).integers(0, 64, (n, 3, 1))
+    t: F64 = np.random.default_rng(seed).integers(0, 64, (n, 3, 1)).astype(np.float64)
     return t * np.array([1.0, 2.0, -0.5]) + 0.25
 
 
 def mixed_scales(seed: int = 5) -> F64:
     """Triangles of sizes 1e-30 to 1e30 around one point."""
-    scales = 10.0 ** np.arange(-30, 31)
+    scales: F64 = 10.0 ** np.arange(-30.0, 31)
     return np.random.default_rng(seed).normal(size=(len(scales), 3, 3)) * scales[:, None, None]
 
 
 def neighbours(n: int = 200, seed: int = 6) -> F64:
     """Corners on three neighbouring float32 numbers each way: every split rounds onto a corner or a bound."""
-    steps = np.random.default_rng(seed).integers(0, 3, (n, 3, 3))
+    steps: F64 = np.random.default_rng(seed).integers(0, 3, (n, 3, 3)).astype(np.float64)
     return 1.0 + steps * 2.0**-23
+
+
+def heavy_floor(top: bool) -> F64:
+    """A high room, most of whose triangles lie in its floor or its ceiling: the median is a bound of the whole."""
+    room = soup(100, 0.02, 9) * np.array([1.0, 1, 8])
+    return np.concatenate([room, flat_sheet(300, 9.0 if top else -1.0)])
 
 
 def large_and_small(seed: int = 7) -> F64:
@@ -97,6 +103,8 @@ MESHES: dict[str, Callable[[], F64]] = {
     "lattice of thirds": lambda: lattice(3, 1 / 3),
     "needles": needles,
     "flat sheet": flat_sheet,
+    "heavy floor": lambda: heavy_floor(False),
+    "heavy ceiling": lambda: heavy_floor(True),
     "identical": lambda: np.repeat(soup(1), 10_000, axis=0),
     "identical, flat": lambda: np.repeat(flat_sheet(1), 1000, axis=0),
     "collinear": collinear,

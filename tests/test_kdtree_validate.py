@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -55,7 +56,7 @@ def test_triangle_removed_from_a_leaf_it_reaches_into_is_found(builder: str) -> 
     assert caught > 100
 
 
-def arrays(child: list[int], count: list[int], indices: list[int]) -> dict[str, np.ndarray]:
+def arrays(child: list[int], count: list[int], indices: list[int]) -> dict[str, Any]:
     """These arrays of a tree."""
     return {name: np.array(value, np.int32) for name, value in (("child", child), ("count", count), ("indices", indices))}
 

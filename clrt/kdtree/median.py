@@ -124,7 +124,7 @@ def _worth_splitting(geometry: _Object, level: _Level, lower: Bools, upper: Bool
 
 
 def _inside(level: _Level, axis: Ints, plane: F32) -> Bools:
-    """Planes strictly within their cell: triangles are not clipped, so a median may lie outside."""
+    """Planes strictly within their cell: those of triangles, not clipped, that are mostly outside or flat in a bound are not."""
     column = np.arange(len(plane))
     return np.asarray((plane > level.cell_lo[axis, column]) & (plane < level.cell_hi[axis, column]))
 
