@@ -62,7 +62,8 @@ def flat_sheet(n: int = 500, height: float = 0.3, seed: int = 3) -> F64:
 def collinear(n: int = 100, seed: int = 4) -> F64:
     """Triangles of exactly zero area along one line."""
     t: F64 = np.random.default_rng(seed).integers(0, 64, (n, 3, 1)).astype(np.float64)
-    return t * np.array([1.0, 2.0, -0.5]) + 0.25
+    corners: F64 = t * np.array([1.0, 2.0, -0.5]) + 0.25
+    return corners
 
 
 def mixed_scales(seed: int = 5) -> F64:

@@ -23,10 +23,7 @@ from clrt.kdtree.common import (
     spread_runs,
     starts_of,
 )
-from clrt.kdtree.tree import KdTree
-
-#: Cost of one step down the tree in triangle tests.
-TRAVERSAL_COST = 8.0
+from clrt.kdtree.tree import TRAVERSAL_COST, KdTree
 
 #: Share of a split's cost forgiven when it cuts off empty space.
 EMPTY_BONUS = 0.1

@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 LEAF = 3  #: the split_axis of a leaf
 
+TRAVERSAL_COST = 8.0  #: one step down the tree, in triangle tests, as packets of 16 rays have it
+
 
 @dataclass(frozen=True, eq=False)
 class KdTree:
@@ -72,7 +74,7 @@ class KdTree:
             level = children[self.split_axis[children] != LEAF]
         return lo, hi
 
-    def sah_cost(self, traversal_cost: float) -> float:
+    def sah_cost(self, traversal_cost: float = TRAVERSAL_COST) -> float:
         """Expected cost of a random line through the bounds, in triangle tests: steps * traversal_cost + tests.
 
         A line that meets a box meets a box within it with the ratio of their areas (Goldsmith and Salmon, 1987). 0 if the bounds
@@ -95,7 +97,7 @@ class KdTree:
             "depth": self.depth,
             "mean_leaf_size": self.mean_leaf_size,
             "greatest_leaf_size": int(self.count.max(initial=0)),
-            "sah_cost": self.sah_cost(traversal_cost=8.0),
+            "sah_cost": self.sah_cost(),
             "bytes": sum(a.nbytes for a in (self.split_axis, self.split_pos, self.child, self.count, self.indices)),
         }
 
