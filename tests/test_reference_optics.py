@@ -88,20 +88,24 @@ def test_nested_ball_of_equal_index_changes_nothing():
     np.testing.assert_allclose(other.pixels, one.pixels, rtol=1e-13)
 
 
-def prism(ior: float, depth: int = 5, refract: float = 0.9, reflect: float = 0.0) -> float:
+def prism_picture(ior: float, depth: int = 5, refract: float = 0.9, reflect: float = 0.0):
     """The background (1) through a right-angled prism: the ray enters a leg straight and meets the slanted face at 45 degrees."""
     p = np.array([[x, y, z] for x in (-1.0, 1.0) for y, z in ((-1, 0), (1, 0), (-1, 2))])
     faces = [p[[0, 1, 2]], p[[3, 5, 4]], *quad(*p[[0, 1, 4, 3]]), *quad(*p[[0, 2, 5, 3]]), *quad(*p[[1, 2, 5, 4]])]
     s = scene([mesh(np.array(faces))], [glass(ior, refract, reflect)], eye=(0.13, -0.2, -3), depth=depth, background=(1.0, 1.0, 1.0))
-    return float(render(s).pixels[0, 0, 0])
+    return render(s)
+
+
+def prism(*arguments: float) -> float:
+    return float(prism_picture(*arguments).pixels[0, 0, 0])
 
 
 def test_total_reflection_begins_at_the_critical_angle():
     """sqrt(2) is the index whose critical angle is 45 degrees. Total: in, reflected, out; else in and out."""
     assert prism(math.sqrt(2.0) * (1 + 1e-9)) == pytest.approx(0.9**3, rel=1e-14)
     assert prism(math.sqrt(2.0) * (1 - 1e-9)) == pytest.approx(0.9**2, rel=1e-14)
-    assert prism(2.0, depth=2) == 0.0
-    assert prism(1.2, depth=2) == pytest.approx(0.9**2, rel=1e-14)
+    assert prism(2.0, 2) == 0.0
+    assert prism(1.2, 2) == pytest.approx(0.9**2, rel=1e-14)
 
 
 @pytest.mark.parametrize(("depth", "paths"), [(0, 0), (1, 1), (3, 2), (5, 3)])
@@ -241,3 +245,23 @@ def test_margin_of_a_shadow_edge_is_that_of_the_segment():
         picture = render(s)
         assert (picture.pixels[0, 0, 0] > 0) == (gap > 0)
         assert 1e-6 / 5 < picture.margin[0, 0] < 1e-5
+
+
+@pytest.mark.parametrize("excess", [1e-5, -1e-5, 1e-8, -1e-8])
+def test_margin_near_the_critical_angle_is_the_angle_to_it(excess):
+    """sin = n / sqrt(2) reaches 1 at sqrt(2); k = 1 - sin^2 = -2 excess, and turning by x changes k by 2 x."""
+    margin = prism_picture(math.sqrt(2.0) * (1 + excess)).margin[0, 0]
+    assert abs(excess) / 4.0 < margin < abs(excess) * 4.0
+    assert prism_picture(1.7).margin[0, 0] == np.inf
+
+
+@pytest.mark.parametrize(("specular", "decided"), [(0.5, True), (0.0, False)])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_margin_of_a_setting_light_counts_where_the_highlight_jumps(specular, decided, side):
+    """N.L = 1e-5 on either side; the highlight is 0.6^2 there, the diffuse term goes to zero by itself."""
+    material = Material((1, 1, 1), 0.1, 0.5, specular, 2.0)
+    s = scene([mesh(plane_z(0.0))], [material], [(-4, 0, -4e-5 * side)], eye=(3, 0, -4), view=(-3, 0, 4))
+    picture = render(s)
+    assert (picture.pixels[0, 0, 0] > 0.2) == (decided and side > 0)
+    low, high = (1e-6, 4e-5) if decided else (np.inf, np.inf)
+    assert low <= picture.margin[0, 0] <= high

@@ -135,10 +135,11 @@ def _light_term(
     gloss = np.where(r_v > 0.0, np.power(np.maximum(r_v, 0.0), materials.exponent[ids]), 0.0) * materials.specular[ids]
     shine = materials.diffuse[ids] * np.maximum(n_l, 0.0) + gloss
     lit = (n_l > 0.0) & (g_l > 0.0)
-    # At N.L = 0 only the specular term jumps, at n_geo.L = 0 both do.
+    # At N.L = 0 only the specular term jumps; at n_geo.L = 0 also the diffuse one, as far as the two normals differ.
+    at_geo = gloss + materials.diffuse[ids] * np.maximum(n_l - g_l, 0.0)
     moved = np.divide(surface.pos_err, distance, where=distance > 0.0, out=np.full_like(distance, np.inf))
     by_shade, by_geo = np.abs(n_l) / (1.0 + moved + surface.curvature * surface.pos_err), np.abs(g_l) / (1.0 + moved)
-    jump_shade, jump_geo = np.abs(gloss) * scale > NO_CONSEQUENCE, np.abs(shine) * scale > NO_CONSEQUENCE
+    jump_shade, jump_geo = np.abs(gloss) * scale > NO_CONSEQUENCE, np.abs(at_geo) * scale > NO_CONSEQUENCE
     leave = np.minimum(np.where(jump_shade, by_shade, np.inf), np.where(jump_geo, by_geo, np.inf))
     enter = np.maximum(np.where(n_l > 0.0, 0.0, by_shade), np.where(g_l > 0.0, 0.0, by_geo))
     return shine, lit, np.where(lit, leave, np.where(jump_geo, enter, np.inf))
