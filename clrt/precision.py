@@ -11,12 +11,17 @@ from clrt.errors import ClrtError
 
 @dataclass(frozen=True)
 class Precision:
-    """One rung. `real`: the number type of lanes; `kernel`: the file that decides a triangle; `promise`: in a sentence."""
+    """One rung. `real`: the number type of lanes; `kernels`: the files that decide a triangle; `promise`: in a sentence."""
 
     name: str
     real: type[np.floating]
-    kernel: str
+    kernels: tuple[str, ...]
     promise: str
+
+    @property
+    def decides_in_stages(self) -> bool:
+        """Whether its kernels count the lanes that float64 and expansions decide."""
+        return "triangle_exact.cl" in self.kernels
 
     @property
     def bits(self) -> int:
@@ -30,8 +35,10 @@ class Precision:
 RUNGS = {
     rung.name: rung
     for rung in (
-        Precision("fast", np.float32, "triangle_fast.cl", "float32, no promise at edges"),
-        Precision("watertight", np.float32, "triangle_watertight.cl", "no ray passes between triangles that share an edge or a vertex"),
+        Precision("fast", np.float32, ("triangle_fast.cl",), "float32, no promise at edges"),
+        Precision("watertight", np.float32, ("triangle_watertight.cl",), "no ray passes between triangles that share an edge or a vertex"),
+        Precision("exact", np.float32, ("expansion.cl", "exact.cl", "triangle_exact.cl"), "the visible primitive of exact arithmetic"),
+        Precision("double", np.float64, ("triangle_watertight.cl",), "float64 throughout, and watertight"),
     )
 }
 DEFAULT = "watertight"

@@ -79,6 +79,8 @@ def render(
         precision=precision, effects=list(features.effects), objects=_object_stats(prepared), build_s=sum(prepared.tree_s),
         upload_s=upload_s, compile_s=compile_s, render_s=end - before, total_s=end - start,
     )  # fmt: skip
+    if tracer.stages is not None:
+        stats.decided = tracer.stages.read()
     if count:
         _count(buffers, stats, tell)
         stats.count_s = time.perf_counter() - end
@@ -178,7 +180,9 @@ def _count(buffers: Buffers, stats: RunStats, tell: Progress) -> None:
     lanes = precision.lanes(device.info.lanes)
     bounces = any(f.name == "bounce" for f in buffers.features.active)
     shape = program.Shape(program.stack_size(stats.depth), buffers.packed.scene.depth if bounces else 0, buffers.shared_lights)
-    tracer = Tracer(buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True)
+    tracer = Tracer(
+        buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True
+    )
     run_rows(tracer, "count", tell)
     kinds = buffers.features.ray_kinds
     stats.ray_counts = {kind: int(n) for kind, n in zip(kinds, tracer.counts, strict=False)}

@@ -47,6 +47,7 @@ class RunStats:
     count_s : the second pass that counts, which no other time contains
     total_s : from the start of the command to the written picture, without `count_s`; from Python, from `render` to the picture
     ray_counts : rays traced by kind (see RAY_KINDS), None unless counted
+    decided : lanes that the rung "exact" decided in float64 and in exact arithmetic; None for other rungs
     effects : names of what the scene calls for, in the order of their kernels
     """
 
@@ -59,6 +60,7 @@ class RunStats:
     effects: list[str] = field(default_factory=list)
     objects: list[ObjectStats] = field(default_factory=list)
     ray_counts: dict[str, int] | None = None
+    decided: dict[str, int] | None = None
     read_s: float = 0.0
     build_s: float = 0.0
     upload_s: float = 0.0
@@ -129,6 +131,7 @@ class RunStats:
             "rays": self.rays,
             "rays_per_s": self.rays_per_s,
             "ray_counts": None if self.ray_counts is None else {k: self.ray_counts.get(k, 0) for k in _kinds(self.ray_counts)},
+            "decided": self.decided,
             "objects": [_object_json(o) for o in self.objects],
         }
 

@@ -42,6 +42,7 @@ inline int bounce_pop(BounceStack *stack, Bounce *current, real extent, Rays *ra
         rays->direction[a] = current->direction[a];
     }
     rays->t_min = (real_n)0;
+    rays->t_max = (real_n)INFINITY;
     rays->skip = current->skip;
     rays->active = current->active;
     rays_prepare(rays, extent);

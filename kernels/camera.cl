@@ -18,6 +18,7 @@ inline void camera_rays(global const Frame *frame, int column, int row, Rays *ra
     const real_n scale = R(1.0) / sqrt(dot_n(rays->direction, rays->direction));
     for (int a = 0; a < 3; a++) rays->direction[a] *= scale;
     rays->t_min = (real_n)0;
+    rays->t_max = (real_n)INFINITY;
     rays->skip = (mask_n)-1;
     rays_prepare(rays, R(0.0));
 }

@@ -6,6 +6,7 @@ typedef struct {
     global const Triangle *triangles;    // a slot each, relative to the local origin, for rays of any origin
     global const EdgePlanes *planes;     // a slot each, seen from the shared origin
     global const double *vertices;       // 9 a slot: the numbers as given
+    global const Surface *surfaces;      // a slot each
     global const Object *objects;
     int object_count, slot_count;        // objects; triangle slots of the scene
     double shared_origin[3];             // as given

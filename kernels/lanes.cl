@@ -60,8 +60,7 @@ inline real_n abs_n(real_n a) { return choose(is_less(a, (real_n)0), -a, a); }
 #if LANES == 16 && REAL_BITS == 32 && defined(__AVX512DQ__) && defined(__clang__)
 #define any_lane(m) (__builtin_ia32_cvtd2mask512(m) != 0)
 #elif LANES == 8 && REAL_BITS == 64 && defined(__AVX512DQ__) && defined(__clang__)
-typedef long long vector_8_long_long __attribute__((ext_vector_type(8)));
-#define any_lane(m) (__builtin_ia32_cvtq2mask512(__builtin_astype(m, vector_8_long_long)) != 0)
+#define any_lane(m) (__builtin_ia32_cvtq2mask512(m) != 0)
 #elif LANES == 16
 inline int any_lane(mask_n m) {
     const PASTE(LANE_INT_NAME, 8) a = m.lo | m.hi;

@@ -6,11 +6,12 @@ typedef struct {
     real_n origin[3];
     real_n direction[3];  // unit length to within 4u
     real_n inverse[3];    // 1 / direction, bounded by HUGE_INVERSE so that no product with a finite distance is NaN
-    real_n t_min;
+    real_n t_min, t_max;  // hits lie strictly between
     mask_n octant;        // bit a set: the direction's component a is negative
     real_n scale;         // |origin|, plus the extent of the scene where corners are rounded: what distances inherit errors from
     mask_n skip;          // a triangle slot each ray passes by (the one it starts on or ends at), or -1
     mask_n active;
+    //@ rays_members
 } Rays;
 
 // The nearest hit so far: `t` starts as the far end of the ray, `slot` is -1 while nothing is hit.

@@ -54,10 +54,12 @@ inline void refraction_turn(global const Material *materials, global const Surfa
             }
             after->count[k] = count - 1;
             to = count > 1 ? after->ior[count - 2][k] : R(1.0);
-        } else if (count < MEDIA_DEPTH) {
-            after->object[count][k] = object;
-            after->ior[count][k] = to;
-            after->count[k] = count + 1;
+        } else {
+            // One object more than a ray remembers takes the newest one's place.
+            const int top = min(count, MEDIA_DEPTH - 1);
+            after->object[top][k] = object;
+            after->ior[top][k] = to;
+            after->count[k] = top + 1;
         }
         // About the shading normal, or about the true one where that would not lead behind the surface.
         const real incoming[3] = {d[0][k], d[1][k], d[2][k]}, shading[3] = {n[0][k], n[1][k], n[2][k]};

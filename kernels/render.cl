@@ -13,6 +13,7 @@ kernel void render(global const Frame *frame, global const int2 *nodes, global c
     geometry.triangles = triangles;
     geometry.planes = eye_planes;
     geometry.vertices = vertices;
+    geometry.surfaces = surfaces;
     geometry.objects = objects;
     geometry.object_count = frame->object_count;
     geometry.slot_count = frame->triangle_slots;

@@ -21,6 +21,7 @@ inline mask_n shadow_lit(const Geometry *geometry, global const Light *light, in
     const real_n length = sqrt(dot_n(span, span));
     for (int a = 0; a < 3; a++) rays.direction[a] = span[a] / length;
     rays.t_min = offset;
+    rays.t_max = length;
     rays.active = lit;
     rays.skip = load_lanes(hit->slot);
     rays_prepare(&rays, R(0.0));

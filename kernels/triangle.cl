@@ -1,4 +1,4 @@
-// Provides: edge_functions: on which side of a triangle's three edges its rays pass; hit_distance; triangle_far_test in float64.
+// Provides: edge_functions: on which side of a triangle's three edges its rays pass; hit_distance; ray_given.
 // Needs: lanes.cl, rays.cl, geometry.cl.  Reads: nothing.
 //
 // Rays that share their origin o (the eye, a point light) use planes through o and each edge, N = b x c of the corners seen from o,
@@ -66,12 +66,25 @@ inline void cross_double(const double *a, const double *b, double *c) {
 }
 inline double dot_double(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-// The corners of a slot seen from one lane's origin, in float64 from the given numbers.
-inline void corners_seen(const Geometry *geometry, const Rays *rays, int slot, int lane, const int shared_origin, double corner[3][3]) {
+// One lane's ray by the numbers as given: origin, direction, and the open interval of t in units of the direction's length.
+inline void ray_given(const Geometry *geometry, const Rays *rays, int lane, const int shared_origin, double *origin, double *direction,
+                      double *t_min, double *t_max) {
+    //@ ray_given
+    real along[LANES], from[LANES];
     for (int a = 0; a < 3; a++) {
-        real origin[LANES];
-        store_lanes(rays->origin[a], origin);
-        const double o = shared_origin ? geometry->shared_origin[a] : geometry->local_origin[a] + (double)origin[lane];
-        for (int c = 0; c < 3; c++) corner[c][a] = geometry->vertices[9 * slot + 3 * c + a] - o;
+        store_lanes(rays->origin[a], from);
+        store_lanes(rays->direction[a], along);
+        origin[a] = shared_origin ? geometry->shared_origin[a] : geometry->local_origin[a] + (double)from[lane];
+        direction[a] = (double)along[lane];
     }
+    store_lanes(rays->t_min, from);
+    store_lanes(rays->t_max, along);
+    *t_min = (double)from[lane];
+    *t_max = (double)along[lane];
+}
+
+// The length of the direction as given, which turns its t into one along the unit direction that lanes use.
+inline double ray_length(const Rays *rays, int lane) {
+    //@ ray_length
+    return 1.0;
 }

@@ -7,6 +7,7 @@ inline void triangle_test(const Geometry *geometry, const Rays *rays, real_n rea
     mask_n grazing;
     const real_n t = hit_distance(geometry, rays, slot, shared_origin, &grazing);
     hit &= ~grazing & is_greater(t, rays->t_min) & is_less(t, hits->t) & ~is_equal(rays->skip, (mask_n)slot);
+    //@ accept
     hits->t = choose(hit, t, hits->t);
     hits->slot = choose(hit, (mask_n)slot, hits->slot);
 }

@@ -9,30 +9,33 @@
 __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n unsure,
                                                   real_n *distance) {
     lane_int test[LANES];
-    real t[LANES], d[3][LANES];
+    real t[LANES];
     store_lanes(unsure, test);
     store_lanes(*distance, t);
-    for (int a = 0; a < 3; a++) store_lanes(rays->direction[a], d[a]);
     for (int k = 0; k < LANES; k++) {
         if (!test[k]) continue;
-        double p[3][3], n[3], sum[3], along[3] = {d[0][k], d[1][k], d[2][k]}, lowest = INFINITY, highest = -INFINITY, bound = 0;
-        corners_seen(geometry, rays, slot, k, shared_origin, p);
+        double origin[3], along[3], t_min, t_max, p[3][3], n[3], e1[3], e2[3], lowest = INFINITY, highest = -INFINITY, bound = 0;
+        ray_given(geometry, rays, k, shared_origin, origin, along, &t_min, &t_max);
+        for (int a = 0; a < 3; a++)
+            for (int c = 0; c < 3; c++) p[c][a] = geometry->vertices[9 * (size_t)slot + 3 * c + a] - origin[a];
         for (int c = 0; c < 3; c++) {
             const double *b = p[(c + 1) % 3], *e = p[(c + 2) % 3];
             cross_double(b, e, n);
             const double f = dot_double(along, n);
             lowest = f < lowest ? f : lowest;
             highest = f > highest ? f : highest;
-            bound = fmax(bound, 0x1p-48 * sqrt(dot_double(b, b) * dot_double(e, e)));
+            bound = fmax(bound, 0x1p-48 * sqrt(dot_double(b, b) * dot_double(e, e) * dot_double(along, along)));
         }
-        for (int a = 0; a < 3; a++) sum[a] = p[1][a] - p[0][a], n[a] = p[2][a] - p[0][a];
-        double normal[3];
-        cross_double(sum, n, normal);
-        const double rate = dot_double(along, normal);
+        for (int a = 0; a < 3; a++) {
+            e1[a] = p[1][a] - p[0][a];
+            e2[a] = p[2][a] - p[0][a];
+        }
+        cross_double(e1, e2, n);
+        const double rate = dot_double(along, n);
         // In the plane to the last bit of float64: a miss by definition.
-        const int hit = (lowest >= -bound || highest <= bound) && fabs(rate) > 0x1p-50 * sqrt(dot_double(normal, normal));
+        const int hit = (lowest >= -bound || highest <= bound) && fabs(rate) > 0x1p-50 * sqrt(dot_double(n, n) * dot_double(along, along));
         test[k] = hit ? -1 : 0;
-        t[k] = hit ? (real)(dot_double(p[0], normal) / rate) : t[k];
+        t[k] = hit ? (real)(dot_double(p[0], n) / rate * ray_length(rays, k)) : t[k];
     }
     *distance = load_lanes(t);
     return load_lanes(test);
@@ -47,6 +50,7 @@ inline void triangle_test(const Geometry *geometry, const Rays *rays, real_n rea
     grazing &= hit;
     if (any_lane(grazing)) hit = (hit & ~grazing) | triangle_grazing(geometry, rays, slot, shared_origin, grazing, &t);
     hit &= is_greater(t, rays->t_min) & is_less(t, hits->t) & ~is_equal(rays->skip, (mask_n)slot);
+    //@ accept
     hits->t = choose(hit, t, hits->t);
     hits->slot = choose(hit, (mask_n)slot, hits->slot);
 }

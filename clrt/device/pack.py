@@ -125,10 +125,14 @@ def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: P
         surfaces=_surfaces(scene, orders, vertices, real),
         materials=_materials(scene, features, precision),
         frame=_frame(scene, origin, objects, len(vertices), features, precision),
-        prim_ids=np.concatenate([o.first_prim + k for o, k in zip(scene.objects, orders, strict=True)] or [np.zeros(0, np.int64)]),
+        prim_ids=_prim_ids(scene, orders),
         orders=tuple(orders),
         real=real,
     )
+
+
+def _prim_ids(scene: Scene, orders: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
+    return np.concatenate([o.first_prim + k for o, k in zip(scene.objects, orders, strict=True)] or [np.zeros(0, np.int64)])
 
 
 def _object_record(item: MeshObject, tree: KdTree, origin: FloatArray, root: int, real: type[np.floating]) -> NDArray[np.void]:
@@ -153,6 +157,7 @@ def _up(values: FloatArray, real: type[np.floating]) -> NDArray[Any]:
 def _surfaces(scene: Scene, orders: Sequence[NDArray[np.int64]], vertices: FloatArray, real: type[np.floating]) -> NDArray[np.void]:
     records = np.zeros(len(vertices), layout.surface(real))
     records["geometric"] = unit_normals(vertices)
+    records["prim"] = _prim_ids(scene, orders)
     first = 0
     for number, (item, order) in enumerate(zip(scene.objects, orders, strict=True)):
         part = records[first : first + len(order)]

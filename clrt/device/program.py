@@ -28,9 +28,13 @@ from clrt.errors import DeviceError, LimitError
 from clrt.features import REAL, Features
 from clrt.precision import Precision
 
-_BEFORE = ("rays.cl", "geometry.cl", "triangle.cl", "{triangle}", "box.cl", "kdtree.cl", "hit.cl")
-_BETWEEN = ("scene.cl", "surface.cl")
-_AFTER = ("camera.cl", "prepare.cl", "render.cl")
+_RAYS = ("rays.cl", "geometry.cl", "triangle.cl")
+_TREES = ("box.cl", "kdtree.cl")
+#: entry point -> files before effects that the traversal calls, between those and other effects, after all
+_ENTRIES = {
+    "render": (("hit.cl",), ("scene.cl", "surface.cl"), ("camera.cl", "prepare.cl", "render.cl")),
+    "cast": ((), ("scene.cl",), ("prepare.cl", "cast.cl")),
+}
 PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a packet, width and height
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
@@ -128,17 +132,21 @@ def _insert(name: str, text: str, hooks: dict[str, list[tuple[str, str, int]]]) 
     return "\n".join(out) + "\n"
 
 
-def _files(features: Features, precision: Precision, counting: bool) -> Iterator[str]:
-    yield from (name.format(triangle=precision.kernel) for name in _BEFORE)
+def _files(features: Features, precision: Precision, entry: str) -> Iterator[str]:
+    before, between, after = _ENTRIES[entry]
+    yield from (*_RAYS, *precision.kernels, *_TREES, *before)
     yield from (f.kernel for f in features.active if f.early)
-    yield from _BETWEEN
+    yield from between
     yield from (f.kernel for f in features.active if not f.early)
-    yield from _AFTER
+    yield from after
 
 
-def compose(features: Features, precision: Precision, lanes: int, shape: Shape, *, counting: bool = False) -> str:
-    """The whole source of the program for these features: a pure function of its arguments and the kernel files."""
-    files = list(_files(features, precision, counting))
+def compose(features: Features, precision: Precision, lanes: int, shape: Shape, *, counting: bool = False, entry: str = "render") -> str:
+    """The whole source of the program for these features: a pure function of its arguments and the kernel files.
+
+    entry : "render" for pictures, "cast" for arrays of rays
+    """
+    files = list(_files(features, precision, entry))
     if counting:
         files.insert(0, "count.cl")
     hooks: dict[str, list[tuple[str, str, int]]] = {

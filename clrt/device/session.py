@@ -43,10 +43,10 @@ class Buffers:
         if need > there:
             raise LimitError(f"{self.packed.slots:,} triangles need {need >> 20:,} MiB on the device, which has {there >> 20:,} MiB")
 
-    def upload(self, array: NDArray[Any]) -> Any:
+    def upload(self, array: NDArray[Any], *, writable: bool = False) -> Any:
         import pyopencl as cl
 
-        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.COPY_HOST_PTR
+        flags = (cl.mem_flags.READ_WRITE if writable else cl.mem_flags.READ_ONLY) | cl.mem_flags.COPY_HOST_PTR
         contents = np.ascontiguousarray(array) if array.size else np.zeros(1, array.dtype)
         return cl.Buffer(self.device.context, flags, hostbuf=contents)
 
@@ -79,6 +79,23 @@ def _double4(values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.array([*values, 0.0])
 
 
+class StageCounter:
+    """How many lanes each later stage of the rung `exact` decided."""
+
+    def __init__(self, buffers: Buffers) -> None:
+        self.queue = buffers.device.queue
+        self.buffer = buffers.upload(np.zeros(2, np.int32), writable=True)
+
+    def read(self) -> dict[str, int]:
+        """The counts since the last call."""
+        import pyopencl as cl
+
+        counts = np.zeros(2, np.int32)
+        cl.enqueue_copy(self.queue, counts, self.buffer)
+        cl.enqueue_copy(self.queue, self.buffer, np.zeros(2, np.int32))
+        return {"float64": int(counts[0]), "exact": int(counts[1])}
+
+
 class Tracer:
     """A built program with the buffers it reads; `run` renders rows of the film."""
 
@@ -95,10 +112,23 @@ class Tracer:
         self.counts = np.zeros(len(self.counters), np.int64)
         self._counter_buffer: Any = buffers.empty(self.counters.nbytes) if counting else None
         nodes, indices, objects, surfaces, materials = buffers.core
-        self._before = (buffers.frame, nodes, indices, buffers.triangles, buffers.eye_planes, buffers.vertices, objects, surfaces, materials)
+        self._before = (
+            buffers.frame,
+            nodes,
+            indices,
+            buffers.triangles,
+            buffers.eye_planes,
+            buffers.vertices,
+            objects,
+            surfaces,
+            materials,
+        )
         self._after = (self.film, *(buffers.effects[name] for f in buffers.features.active for name, _ in f.parameters))
         if counting:
             self._after += (self._counter_buffer,)
+        self.stages = StageCounter(buffers) if buffers.precision.decides_in_stages else None
+        if self.stages is not None:
+            self._after += (self.stages.buffer,)
 
     def warm_up(self) -> None:
         """Launches over no rows: PoCL compiles for a local size at its first launch, which belongs to compiling."""

@@ -1,0 +1,102 @@
+// Provides: triangle_test of the rung `exact`: the visible triangle is the one that exact arithmetic on the given numbers gives.
+// Needs: lanes.cl, rays.cl, geometry.cl, triangle.cl, exact.cl.  Reads: nothing.
+//
+// A filter: where the float32 edge functions and distances clear their bounds, their signs are right (triangle.cl), and the lane is
+// decided as in the other rungs. The lanes left are decided in float64 with bounds, and those left of them in exact expansions
+// (exact.cl). Hits carry t as an interval [low, t]; of equal t the lowest primitive id stays.
+
+// t is off by the relative error |n| 8u / |rate| of triangle.cl (8u at the least, as |rate| <= |n|(1 + 4u)), and for rays of their
+// own origin by 8u reach |n| / |rate| more, for the rounded origin and corner; `normal_bound` is 8u |n|.
+inline real_n distance_error(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, real_n t) {
+    real_n rate, normal_bound;
+    if (shared_origin) {
+        rate = dot_uniform(rays->direction, geometry->planes[slot].normal);
+        normal_bound = (real_n)geometry->planes[slot].normal_bound;
+        return R(2.0) * abs_n(t) * normal_bound / abs_n(rate);
+    }
+    rate = dot_uniform(rays->direction, geometry->triangles[slot].normal);
+    normal_bound = (real_n)geometry->triangles[slot].normal_bound;
+    return R(2.0) * (abs_n(t) + reach) * normal_bound / abs_n(rate);
+}
+
+// The lanes in `unsure`, one by one, by the numbers as given: those that hit nearer than what they have; their t.
+__attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n unsure,
+                                                 const Hits *hits, real_n *distance) {
+    lane_int test[LANES], best[LANES];
+    real t[LANES];
+    store_lanes(unsure, test);
+    store_lanes(hits->slot, best);
+    store_lanes(*distance, t);
+    int decided_double = 0, decided_exact = 0;
+    for (int k = 0; k < LANES; k++) {
+        if (!test[k]) continue;
+        double origin[3], direction[3], t_min, t_max;
+        ray_given(geometry, rays, k, shared_origin, origin, direction, &t_min, &t_max);
+        Plane plane;
+        int stage = 1;
+        plane_double(geometry, origin, direction, slot, &plane);
+        int hit = exact_inside(geometry, origin, direction, slot, &plane, &stage);
+        hit = hit && exact_after(geometry, origin, direction, slot, &plane, t_min, &stage) > 0;
+        hit = hit && exact_after(geometry, origin, direction, slot, &plane, t_max, &stage) < 0;
+        //@ exact_accept
+        if (hit && best[k] >= 0) {
+            const int order = exact_nearer(geometry, origin, direction, slot, &plane, best[k], &stage);
+            hit = order < 0 || (order == 0 && geometry->surfaces[slot].prim < geometry->surfaces[best[k]].prim);
+        }
+        test[k] = hit ? -1 : 0;
+        if (hit) {
+            double at = plane.offset / plane.rate;
+            if (fabs(plane.rate) <= 0x1p20 * plane.rate_error || fabs(plane.offset) <= 0x1p20 * plane.offset_error) {
+                Expansion offset, rate;
+                exact_distance(geometry, origin, direction, slot, &offset, &rate);
+                at = expansion_value(&offset) / expansion_value(&rate);
+            }
+            t[k] = (real)(at * ray_length(rays, k));
+        }
+        decided_double += stage == 1;
+        decided_exact += stage == 2;
+    }
+    if (decided_double) atomic_add(geometry->decided, decided_double);
+    if (decided_exact) atomic_add(geometry->decided + 1, decided_exact);
+    *distance = load_lanes(t);
+    return load_lanes(test);
+}
+
+inline void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, mask_n live, Hits *hits) {
+    const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared_origin);
+    mask_n possible = live & (is_at_least(f.lowest, -f.bound) | is_at_most(f.highest, f.bound));
+    if (!any_lane(possible)) return;
+    mask_n grazing;
+    real_n t = hit_distance(geometry, rays, slot, shared_origin, &grazing);
+    real_n error = distance_error(geometry, rays, reach, slot, shared_origin, t);
+    const mask_n outside = is_less(t + error, rays->t_min) | is_greater(t - error, hits->t);
+    possible &= (grazing | ~outside) & ~is_equal(rays->skip, (mask_n)slot);
+    mask_n hit = possible & ~grazing & (is_greater(f.lowest, f.bound) | is_less(f.highest, -f.bound));
+    hit &= is_greater(t - error, rays->t_min) & is_less(t + error, hits->low);
+    //@ accept_sure
+    const mask_n unsure = possible & ~hit;
+    if (any_lane(unsure)) {
+        const mask_n found = triangle_unsure(geometry, rays, slot, shared_origin, unsure, hits, &t);
+        error = choose(found, (R(4.0) * UNIT_ROUNDOFF) * abs_n(t), error);
+        hit |= found;
+    }
+    hits->t = choose(hit, t + error, hits->t);
+    hits->low = choose(hit, t - error, hits->low);
+    hits->slot = choose(hit, (mask_n)slot, hits->slot);
+}
+
+//@hook parameters
+                   , volatile global int *decided
+//@end
+//@hook geometry_members
+    volatile global int *decided;        // lanes decided in float64, in expansions
+//@end
+//@hook begin
+    geometry.decided = decided;
+//@end
+//@hook hits_members
+    real_n low;                          // t is at least this
+//@end
+//@hook hits_begin
+        hits.low = hits.t * (R(1.0) - R(8.0) * UNIT_ROUNDOFF);
+//@end
