@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -77,7 +77,7 @@ class Context:
         """A generator that depends on the seed and the number of the case alone, so that one case can be run by itself."""
         return np.random.default_rng((self.seed, number))
 
-    def caster(self, key: Hashable, mesh: object, rung: str, tree: str = "sah") -> RayCaster:
+    def caster(self, key: Hashable, mesh: Any, rung: str, tree: str = "sah") -> RayCaster:
         """A RayCaster, kept under (key, rung, tree): the key must name the mesh. Raises what RayCaster raises."""
         from clrt.rays import RayCaster
 

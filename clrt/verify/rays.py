@@ -21,11 +21,12 @@ class Rays(NamedTuple):
     directions: Array
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         return len(self.origins)
 
-    def __getitem__(self, part: object) -> Rays:  # type: ignore[override]  # rows of both arrays, as NumPy would
-        return Rays(self.origins[part], self.directions[part])  # type: ignore[index]
+    def take(self, rows: slice | NDArray[np.integer] | NDArray[np.bool_]) -> Rays:
+        """Some of the rays, as NumPy would index them."""
+        return Rays(self.origins[rows], self.directions[rows])
 
 
 def rays_of(origins: ArrayLike, directions: ArrayLike, dtype: type[np.floating] = np.float32) -> Rays:
