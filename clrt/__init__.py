@@ -18,18 +18,20 @@ from clrt.errors import ClrtError, DeviceError, LimitError, MeshError, SceneErro
 if TYPE_CHECKING:
     from clrt.device.context import DeviceInfo
     from clrt.image.image import Image
+    from clrt.rays import RayCaster
     from clrt.scene.model import Scene
     from clrt.stats import ObjectStats, RunStats
 
 __version__ = "0.1.0"
 
 __all__ = [
-    "ClrtError", "DeviceError", "Image", "LimitError", "MeshError", "ObjectStats", "RunStats", "Scene", "SceneError",
+    "ClrtError", "DeviceError", "Image", "LimitError", "MeshError", "ObjectStats", "RayCaster", "RunStats", "Scene", "SceneError",
     "devices", "load", "render",
 ]  # fmt: skip
 
 _LAZY = {
     "Image": "clrt.image.image",
+    "RayCaster": "clrt.rays",
     "Scene": "clrt.scene.model",
     "RunStats": "clrt.stats",
     "ObjectStats": "clrt.stats",

@@ -48,7 +48,9 @@ def object_record(real: type) -> np.dtype[np.void]:
 
 def surface(real: type) -> np.dtype[np.void]:
     """What shading asks of a triangle: unit normals (of the surface, for shading), material, object, primitive id."""
-    return struct_dtype([("geometric", real, (3,)), ("normal", real, (3,)), ("material", np.int32), ("object", np.int32), ("prim", np.int32)])
+    return struct_dtype(
+        [("geometric", real, (3,)), ("normal", real, (3,)), ("material", np.int32), ("object", np.int32), ("prim", np.int32)]
+    )
 
 
 def material(real: type, extra: Sequence[Field]) -> np.dtype[np.void]:

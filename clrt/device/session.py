@@ -55,8 +55,8 @@ class Buffers:
 
         return cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, size)
 
-    def prepare(self, built: Any) -> None:
-        """Computes the records that rays test, on the device, from the vertices as given."""
+    def prepare(self, built: Any, *, planes: bool = True) -> None:
+        """Computes the records that rays test, on the device, from the vertices as given; `planes`: those of shared origins, too."""
         import pyopencl as cl
 
         packed, queue, count = self.packed, self.device.queue, np.int32(self.packed.slots)
@@ -65,14 +65,17 @@ class Buffers:
         size = (-(-packed.slots // _PREPARE_LOCAL) * _PREPARE_LOCAL,)
         origin = _double4(packed.origin)
         cl.Kernel(built, "prepare_triangles")(queue, size, (_PREPARE_LOCAL,), self.vertices, origin, self.triangles, count)
-        planes = cl.Kernel(built, "prepare_planes")
-        local = (_PREPARE_LOCAL,)
-        planes(queue, size, local, self.vertices, _double4(packed.scene.camera.eye), self.eye_planes, np.int32(0), count)
+        if planes:
+            self._prepare_planes(cl.Kernel(built, "prepare_planes"), size, count)
+        queue.finish()
+
+    def _prepare_planes(self, kernel: Any, size: tuple[int], count: np.int32) -> None:
+        packed, queue, local = self.packed, self.device.queue, (_PREPARE_LOCAL,)
+        kernel(queue, size, local, self.vertices, _double4(packed.scene.camera.eye), self.eye_planes, np.int32(0), count)
         if "light_planes" in self.effects and self.shared_lights:
             for i, light in enumerate(packed.scene.lights):
                 first = np.int32(i * packed.slots)
-                planes(queue, size, local, self.vertices, _double4(np.asarray(light.position)), self.effects["light_planes"], first, count)
-        queue.finish()
+                kernel(queue, size, local, self.vertices, _double4(np.asarray(light.position)), self.effects["light_planes"], first, count)
 
 
 def _double4(values: NDArray[np.float64]) -> NDArray[np.float64]:
