@@ -15,7 +15,7 @@ from clrt.cli import failure
 from clrt.cli.paths import DEFAULT_SCENE
 
 #: a command and the module that has it, in the order of the help; imported when called for, so that `clrt --help` is quick
-_COMMANDS = {"render": "render", "devices": "devices", "convert": "scenes", "make": "scenes"}
+_COMMANDS = {"render": "render", "devices": "devices", "verify": "verify", "convert": "scenes", "make": "scenes"}
 
 _HELP = """Render a scene text to a picture.
 

@@ -1,0 +1,89 @@
+"""`clrt verify`: the catalogue of hard cases on the user's device."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from clrt.cli.failure import FAULT
+from clrt.cli.progress import PhaseProgress
+from clrt.files import atomic_write, check_writable
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from clrt.verify.case import Context, Result
+
+
+@click.command("verify")
+@click.option("--full", is_flag=True, help="1,000,000 rays a case instead of 100,000: many minutes.")
+@click.option("--case", "numbers", type=click.IntRange(min=1), multiple=True, metavar="N", help="Run this case alone; may be repeated.")
+@click.option("--json", "json_path", metavar="FILE", help="Write all results as JSON too; - for standard output, instead of the table.")
+@click.option("--device", metavar="NAME", help="Part of the name of a device that `clrt devices` lists.")
+@click.option("--quiet", is_flag=True, help="No table and no progress: broken promises and the exit code only.")
+def verify(full: bool, numbers: tuple[int, ...], json_path: str | None, device: str | None, quiet: bool) -> int:
+    """Run the hard cases of docs/numerics.md on this machine.
+
+    Counts disagreements with the oracle for each precision, and for a naive variant, which must fail. Exit codes: 0 all promises
+    hold, 1 one is broken, 2 something to mend.
+    """
+    from clrt.verify.run import chosen, context_for, failures, run, to_json
+
+    cases = chosen(numbers)
+    if json_path not in (None, "-"):
+        check_writable(json_path)
+    context = context_for(device, full=full)
+    with PhaseProgress(quiet=quiet) as progress:
+        results = run(cases, context, progress)
+    if json_path is not None:
+        _write_json(json.dumps(to_json(results, context), indent=2, ensure_ascii=False) + "\n", json_path)
+    if not quiet and json_path != "-":
+        _print(results, context)
+    broken = failures(results, context)
+    for line in broken:
+        click.echo(f"clrt: broken promise: {line}", err=True)
+    return FAULT if broken else 0
+
+
+def _write_json(text: str, path: str) -> None:
+    if path == "-":
+        click.echo(text, nl=False)
+    else:
+        with atomic_write(path) as file:
+            file.write(text.encode())
+
+
+def _print(results: list[Result], context: Context) -> None:
+    from rich.text import Text
+
+    from clrt.cli.report import print_plainly, seconds
+
+    passed = sum(not r.failures(context.rungs) for r in results)
+    total = f"{passed} of {len(results)} cases pass, {seconds(sum(r.seconds for r in results))}"
+    print_plainly([result_table(results, context), Text(), Text(total, style="bold")])
+
+
+def result_table(results: list[Result], context: Context) -> Table:
+    """A row a case. Counts in brackets: the rung makes no promise there. A dash: the case does not apply to it."""
+    from rich.text import Text
+
+    from clrt.cli.report import seconds, table
+
+    shown = table(["case", "", "rays", *context.rungs, "naive", "time", ""], words=2)
+    for result in results:
+        case, outcome = result.case, result.outcome
+        passed = not result.failures(context.rungs)
+        counts = [_count(result, rung) for rung in context.rungs]
+        rays, naive = (f"{outcome.rays:,}", f"{outcome.naive:,}") if outcome else ("-", "-")
+        word = Text("pass" if passed else "FAIL", style="" if passed else "bold red")
+        shown.add_row(str(case.number), Text(case.title), rays, *counts, naive, seconds(result.seconds), word)
+    return shown
+
+
+def _count(result: Result, rung: str) -> str:
+    wrong = result.outcome.wrong.get(rung) if result.outcome else None
+    if wrong is None:
+        return "-"
+    return f"{wrong:,}" if rung in result.case.promised else f"({wrong:,})"
