@@ -26,8 +26,8 @@ lint: $(VENV)/dev.stamp ## ruff and mypy
 	$(BIN)/ruff check
 	$(BIN)/mypy --strict
 
-bench: $(VENV)/bench.stamp ## measure, into bench-results/
-	$(BIN)/python -m bench
+bench: $(VENV)/bench.stamp ## measure, into bench-results/; BENCH=--write-docs fills the tables of the documentation
+	$(BIN)/python -m clrt.bench $(BENCH)
 
 clean: ## remove .venv, out/ and caches
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache

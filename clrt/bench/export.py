@@ -1,0 +1,71 @@
+"""Results as files: JSON with every time, and the tables in the marked places of the documentation."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from clrt.bench.report import markdown, tables, trees_table, versus_table
+from clrt.errors import ClrtError
+from clrt.files import atomic_write, check_writable
+
+BEGIN, END = "<!-- bench:begin -->", "<!-- bench:end -->"
+_PLACE = re.compile(rf"{re.escape(BEGIN)}\n.*?{re.escape(END)}", re.S)
+_KEYS = ("started", "quick", "machine", "scenes", "trees", "versus", "tests", "command", "programs", "marks")
+
+
+def save(results: dict[str, Any], folder: Path) -> Path:
+    """Write the results to a new file in `folder`, called by date and processor; returns its path. Raises OSError."""
+    folder.mkdir(parents=True, exist_ok=True)
+    processor = re.sub(r"[^a-z0-9]+", "-", f"{results['machine']['cpu']} {results['machine']['cores']} cores".lower()).strip("-")
+    date = re.sub(r"[^0-9T]", "", results["started"].partition("+")[0])
+    path = folder / f"{date}-{processor}{'-quick' if results['quick'] else ''}.json"
+    with atomic_write(path) as file:
+        file.write((json.dumps(results, indent=1, allow_nan=False) + "\n").encode())
+    return path
+
+
+def read(path: Path) -> dict[str, Any]:
+    """The results in a file that `save` wrote. Raises ClrtError where it is none, OSError."""
+    try:
+        results = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ClrtError(f"{path}: no JSON ({error}); give a file that `python -m clrt.bench` wrote") from None
+    missing = [key for key in _KEYS if not isinstance(results, dict) or key not in results]
+    if missing:
+        raise ClrtError(f"{path}: no results of the benchmarks, {missing[0]} is missing; give a file that `python -m clrt.bench` wrote")
+    return dict(results)
+
+
+def check_docs(root: Path) -> None:
+    """Raise ClrtError where the checkout at `root` has no marked places, OSError where they cannot be written: before the work."""
+    for path in _documents(root):
+        if not path.is_file():
+            raise ClrtError(f"{path}: no such file; --write-docs works in a checkout")
+        check_writable(path)
+        if len(_PLACE.findall(path.read_text(encoding="utf-8"))) != 1:
+            raise ClrtError(f"{path}: the tables go between the lines {BEGIN} and {END}, which this file must have once")
+
+
+def write_docs(results: dict[str, Any], root: Path) -> list[Path]:
+    """Put all tables into docs/performance.md and the main ones into README.md; returns both. Raises as `check_docs`."""
+    if results["quick"]:
+        raise ClrtError("a quick run is not for the documentation; leave out --quick")
+    check_docs(root)
+    page, readme = _documents(root)
+    largest = max(row["size"] for row in results["trees"])
+    main = [
+        trees_table([row for row in results["trees"] if row["size"] == largest]),
+        versus_table(results["versus"], results["machine"]["cores"]),
+    ]
+    for path, text in ((page, markdown(results, tables(results), level=3)), (readme, markdown(results, main, level=3))):
+        before, _, after = path.read_text(encoding="utf-8").partition(BEGIN)
+        with atomic_write(path) as file:
+            file.write(f"{before}{BEGIN}\n{text}\n{END}{after.partition(END)[2]}".encode())
+    return [page, readme]
+
+
+def _documents(root: Path) -> tuple[Path, Path]:
+    return root / "docs" / "performance.md", root / "README.md"
