@@ -15,7 +15,7 @@ typedef struct {
 } BounceStack;
 
 // Puts `direction` from the hit point on the stack for the lanes in `active`, starting on the side that it points to; gives its place there.
-inline Bounce *bounce_push(BounceStack *stack, const Hit *hit, const real_n *direction, real_n weight, mask_n active, const Bounce *from) {
+HOT Bounce *bounce_push(BounceStack *stack, const Hit *hit, const real_n *direction, real_n weight, mask_n active, const Bounce *from) {
     Bounce *next = stack->entry + stack->count;
     if (!any_lane(active)) return next;
     stack->count++;
@@ -34,7 +34,7 @@ inline Bounce *bounce_push(BounceStack *stack, const Hit *hit, const real_n *dir
 }
 
 // Takes the next packet off the stack; 0 where none waits.
-inline int bounce_pop(BounceStack *stack, Bounce *current, real extent, Rays *rays) {
+HOT int bounce_pop(BounceStack *stack, Bounce *current, real extent, Rays *rays) {
     if (stack->count == 0) return 0;
     *current = stack->entry[--stack->count];
     for (int a = 0; a < 3; a++) {
@@ -50,7 +50,7 @@ inline int bounce_pop(BounceStack *stack, Bounce *current, real extent, Rays *ra
 }
 
 // The reflected direction: about the shading normal, or about the true one where that would lead below the surface.
-inline void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
+HOT void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
     const real_n twice = R(2.0) * dot_n(rays->direction, hit->normal), true_twice = R(2.0) * dot_n(rays->direction, hit->geometric);
     for (int a = 0; a < 3; a++) direction[a] = rays->direction[a] - twice * hit->normal[a];
     const mask_n below = is_at_most(dot_n(direction, hit->geometric), (real_n)0);

@@ -9,12 +9,12 @@
 #define RELATIVE_WIDENING (R(8.0) * UNIT_ROUNDOFF)
 
 // A bound on the distance from each ray's origin to any point of the object's triangles plus their longest edge.
-inline real_n rays_reach(const Rays *rays, global const Object *object) {
+HOT real_n rays_reach(const Rays *rays, global const Object *object) {
     return abs_n(rays->origin[0]) + abs_n(rays->origin[1]) + abs_n(rays->origin[2]) + (real_n)object->extent;
 }
 
 // Lanes that may meet the object's box, with the interval of t inside it; `slab` is pad |1/d| by axis, for kdtree_trace.
-inline mask_n box_clip(global const Object *object, const Rays *rays, real_n t_max, real_n *slab, real_n *t_enter, real_n *t_leave) {
+HOT mask_n box_clip(global const Object *object, const Rays *rays, real_n t_max, real_n *slab, real_n *t_enter, real_n *t_leave) {
     const real_n pad = (R(2.0) * UNIT_ROUNDOFF) * rays_reach(rays, object);
     // The new bound comes first: where it is NaN (beyond the range of `real`), min_n and max_n keep the old one.
     real_n enter = rays->t_min, leave = t_max;

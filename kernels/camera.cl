@@ -2,7 +2,7 @@
 // Needs: lanes.cl, rays.cl, structs.  Reads: PACKET_WIDTH, PACKET_HEIGHT (their product is LANES).
 
 // Rays through the centres of the pixels from (column, row) on; pixels outside the picture are inactive.
-inline void camera_rays(global const Frame *frame, int column, int row, Rays *rays) {
+HOT void camera_rays(global const Frame *frame, int column, int row, Rays *rays) {
     real x[LANES], y[LANES];
     for (int k = 0; k < LANES; k++) {
         x[k] = column + k % PACKET_WIDTH;

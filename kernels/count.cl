@@ -1,12 +1,15 @@
 // Provides: counters of rays by kind and of ray-triangle tests by object, for the counting build alone.
 // Needs: lanes.cl.  Reads: COUNT_* (the place of each kind), COUNT_TESTS (that of object 0).
-inline void count_rays(volatile global uint *counters, int kind, mask_n lanes) {
+static inline void count_rays(volatile global uint *counters, int kind, mask_n lanes) {
     const int n = count_lanes(lanes);
     if (n > 0) atomic_add(counters + kind, (uint)n);
 }
 
 //@hook parameters
                    , volatile global uint *counters
+//@end
+//@hook arguments
+                  , counters
 //@end
 //@hook geometry_members
     volatile global uint *counters;

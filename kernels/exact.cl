@@ -16,7 +16,7 @@ typedef struct {
     double offset, offset_error;
 } Plane;
 
-inline void triple_double(const double *d, const double *p, const double *q, double *value, double *error) {
+static inline void triple_double(const double *d, const double *p, const double *q, double *value, double *error) {
     double sum = 0, size = 0;
     for (int a = 0; a < 3; a++) {
         const int b = (a + 1) % 3, c = (a + 2) % 3;
@@ -27,7 +27,7 @@ inline void triple_double(const double *d, const double *p, const double *q, dou
     *error = DOUBLE_BOUND * size + UNDERFLOW;
 }
 
-inline void plane_double(const Geometry *geometry, const double *origin, const double *direction, int slot, Plane *plane) {
+static inline void plane_double(const Geometry *geometry, const double *origin, const double *direction, int slot, Plane *plane) {
     global const double *v = geometry->vertices + 9 * (size_t)slot;
     double corner[3][3], e1[3], e2[3];
     for (int a = 0; a < 3; a++) {
@@ -42,7 +42,7 @@ inline void plane_double(const Geometry *geometry, const double *origin, const d
 }
 
 // The same numbers without error, made only where float64 cannot decide.
-inline void exact_edges(const Geometry *geometry, const double *origin, const double *direction, int slot, Expansion *edge) {
+static inline void exact_edges(const Geometry *geometry, const double *origin, const double *direction, int slot, Expansion *edge) {
     global const double *v = geometry->vertices + 9 * (size_t)slot;
     Expansion corner[3][3], d[3];
     for (int a = 0; a < 3; a++) {
@@ -52,7 +52,7 @@ inline void exact_edges(const Geometry *geometry, const double *origin, const do
     for (int c = 0; c < 3; c++) expansion_triple(d, corner[(c + 1) % 3], corner[(c + 2) % 3], edge + c);
 }
 
-inline void exact_distance(const Geometry *geometry, const double *origin, const double *direction, int slot, Expansion *offset,
+static inline void exact_distance(const Geometry *geometry, const double *origin, const double *direction, int slot, Expansion *offset,
                            Expansion *rate) {
     global const double *v = geometry->vertices + 9 * (size_t)slot;
     Expansion corner[3], d[3], e1[3], e2[3];
@@ -66,11 +66,11 @@ inline void exact_distance(const Geometry *geometry, const double *origin, const
     expansion_triple(d, e1, e2, rate);
 }
 
-inline int sign_double(double value, double error) { return value > error ? 1 : value < -error ? -1 : 0; }
+static inline int sign_double(double value, double error) { return value > error ? 1 : value < -error ? -1 : 0; }
 
 // Whether the ray meets the closed triangle: no two edge functions of opposite sign, and not all zero (in the plane, or no area).
 // `stage` rises to 2 where expansions were needed.
-inline int exact_inside(const Geometry *geometry, const double *origin, const double *direction, int slot, const Plane *plane, int *stage) {
+static inline int exact_inside(const Geometry *geometry, const double *origin, const double *direction, int slot, const Plane *plane, int *stage) {
     int positive = 0, negative = 0, unsure = 0;
     for (int c = 0; c < 3; c++) {
         const int sign = sign_double(plane->edge[c], plane->edge_error[c]);
@@ -92,7 +92,7 @@ inline int exact_inside(const Geometry *geometry, const double *origin, const do
 }
 
 // The sign of t - limit.
-inline int exact_after(const Geometry *geometry, const double *origin, const double *direction, int slot, const Plane *plane, double limit,
+static inline int exact_after(const Geometry *geometry, const double *origin, const double *direction, int slot, const Plane *plane, double limit,
                        int *stage) {
     if (!(fabs(limit) < INFINITY)) return limit > 0 ? -1 : 1;
     const double value = plane->offset - limit * plane->rate;
@@ -108,7 +108,7 @@ inline int exact_after(const Geometry *geometry, const double *origin, const dou
 }
 
 // The sign of t(slot) - t(other).
-inline int exact_nearer(const Geometry *geometry, const double *origin, const double *direction, int slot, const Plane *plane, int other,
+static inline int exact_nearer(const Geometry *geometry, const double *origin, const double *direction, int slot, const Plane *plane, int other,
                         int *stage) {
     Plane q;
     plane_double(geometry, origin, direction, other, &q);

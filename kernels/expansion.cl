@@ -16,35 +16,35 @@ typedef struct {
     double c[COMPONENTS];  // nonzero, nonoverlapping, by growing magnitude
 } Expansion;
 
-inline void two_sum(double a, double b, double *x, double *y) {
+static inline void two_sum(double a, double b, double *x, double *y) {
     *x = a + b;
     const double part = *x - a;
     *y = (a - (*x - part)) + (b - part);
 }
-inline void fast_two_sum(double a, double b, double *x, double *y) {
+static inline void fast_two_sum(double a, double b, double *x, double *y) {
     *x = a + b;
     *y = b - (*x - a);
 }
-inline void two_product(double a, double b, double *x, double *y) {
+static inline void two_product(double a, double b, double *x, double *y) {
     *x = a * b;
     *y = fma(a, b, -*x);
 }
 
 // a - b, exactly.
-inline void expansion_difference(double a, double b, Expansion *e) {
+static inline void expansion_difference(double a, double b, Expansion *e) {
     double high, low;
     two_sum(a, -b, &high, &low);
     e->count = 0;
     if (low != 0) e->c[e->count++] = low;
     if (high != 0) e->c[e->count++] = high;
 }
-inline void expansion_single(double a, Expansion *e) {
+static inline void expansion_single(double a, Expansion *e) {
     e->count = a != 0;
     e->c[0] = a;
 }
 
 // Shewchuk's Compress: the same number in the fewest components.
-inline void expansion_compress(Expansion *e) {
+static inline void expansion_compress(Expansion *e) {
     if (e->count < 2) return;
     double sum = e->c[e->count - 1], rest;
     int bottom = e->count - 1;
@@ -65,7 +65,7 @@ inline void expansion_compress(Expansion *e) {
 }
 
 // h += b, for one number.
-inline void expansion_grow(Expansion *h, double b) {
+static inline void expansion_grow(Expansion *h, double b) {
     int top = 0;
     double sum = b, rest;
     for (int i = 0; i < h->count; i++) {
@@ -76,7 +76,7 @@ inline void expansion_grow(Expansion *h, double b) {
     h->count = top;
 }
 
-__attribute__((noinline)) void expansion_add_scaled(Expansion *h, const Expansion *e, double b) {
+static __attribute__((noinline)) void expansion_add_scaled(Expansion *h, const Expansion *e, double b) {
     if (e->count == 0 || b == 0) return;
     double carry, low, high, rest;
     two_product(e->c[0], b, &carry, &low);
@@ -92,12 +92,12 @@ __attribute__((noinline)) void expansion_add_scaled(Expansion *h, const Expansio
     expansion_compress(h);
 }
 
-inline void expansion_add_product(Expansion *h, const Expansion *a, const Expansion *b, double sign) {
+static inline void expansion_add_product(Expansion *h, const Expansion *a, const Expansion *b, double sign) {
     for (int i = 0; i < b->count; i++) expansion_add_scaled(h, a, sign * b->c[i]);
 }
 
 // d . (p x q)
-__attribute__((noinline)) void expansion_triple(const Expansion *d, const Expansion *p, const Expansion *q, Expansion *result) {
+static __attribute__((noinline)) void expansion_triple(const Expansion *d, const Expansion *p, const Expansion *q, Expansion *result) {
     Expansion cross;
     result->count = 0;
     for (int a = 0; a < 3; a++) {
@@ -109,10 +109,10 @@ __attribute__((noinline)) void expansion_triple(const Expansion *d, const Expans
     }
 }
 
-inline int expansion_sign(const Expansion *e) { return e->count == 0 ? 0 : e->c[e->count - 1] > 0 ? 1 : -1; }
+static inline int expansion_sign(const Expansion *e) { return e->count == 0 ? 0 : e->c[e->count - 1] > 0 ? 1 : -1; }
 
 // The nearest double but for an ulp.
-inline double expansion_value(const Expansion *e) {
+static inline double expansion_value(const Expansion *e) {
     double sum = 0;
     for (int i = 0; i < e->count; i++) sum += e->c[i];
     return sum;

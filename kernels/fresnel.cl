@@ -17,19 +17,19 @@
 // cos i is in [0, 1], indices in [2^-20, 2^20]. F = 0 and T = 1 for equal indices, at every angle; F = 1 and T = 0 for total reflection.
 
 // x + y as a pair (Knuth's two-sum); x y as a pair.
-inline real fresnel_sum(real x, real y, real *rest) {
+static inline real fresnel_sum(real x, real y, real *rest) {
     const real sum = x + y, part = sum - x;
     *rest = (x - (sum - part)) + (y - part);
     return sum;
 }
-inline real fresnel_product(real x, real y, real *rest) {
+static inline real fresnel_product(real x, real y, real *rest) {
     const real product = x * y;
     *rest = fma(x, y, -product);
     return product;
 }
 
 // b^2 = (n1 cos i)^2 + n2^2 - n1^2 and the difference D of the squared indices, each rounded about once.
-inline real fresnel_square(real cos_i, real n1, real n2, real *difference) {
+static inline real fresnel_square(real cos_i, real n1, real n2, real *difference) {
     real a_rest, a2_rest, n1_rest, n2_rest, d_rest, b_rest;
     const real a = fresnel_product(n1, cos_i, &a_rest), a2 = fresnel_product(a, a, &a2_rest);
     const real n1_2 = fresnel_product(n1, n1, &n1_rest), n2_2 = fresnel_product(n2, n2, &n2_rest);
@@ -40,7 +40,7 @@ inline real fresnel_square(real cos_i, real n1, real n2, real *difference) {
     return b2 + (b_rest + (a2_rest + R(2.0) * a * a_rest + d_rest));
 }
 
-inline real fresnel_dielectric(real cos_i, real n1, real n2) {
+static inline real fresnel_dielectric(real cos_i, real n1, real n2) {
     real d;
     const real b2 = fresnel_square(cos_i, n1, n2, &d);
     if (d == R(0.0)) return R(0.0);
@@ -52,7 +52,7 @@ inline real fresnel_dielectric(real cos_i, real n1, real n2) {
     return fmin(R(0.5) * r_s * r_s * (R(1.0) + ratio * ratio), R(1.0));
 }
 
-inline real fresnel_transmitted(real cos_i, real n1, real n2) {
+static inline real fresnel_transmitted(real cos_i, real n1, real n2) {
     real d;
     const real b2 = fresnel_square(cos_i, n1, n2, &d);
     if (d == R(0.0)) return R(1.0);

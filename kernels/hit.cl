@@ -19,16 +19,16 @@ typedef struct {
     lane_int material[LANES];
 } Hit;
 
-inline void normalize_n(real_n *a) {
+HOT void normalize_n(real_n *a) {
     const real_n scale = R(1.0) / sqrt(dot_n(a, a));
     for (int i = 0; i < 3; i++) a[i] *= scale;
 }
 
 // Turns `a` to the side of `b`.
-inline void face_towards(real_n *a, const real_n *b, const int away) {
+HOT void face_towards(real_n *a, const real_n *b, const int away) {
     const mask_n flip = away ? is_greater(dot_n(a, b), (real_n)0) : is_less(dot_n(a, b), (real_n)0);
     for (int i = 0; i < 3; i++) a[i] = choose(flip, -a[i], a[i]);
 }
 
 // The hit point moved towards the viewer by `distance`, far enough that no rounding puts it behind.
-inline real_n hit_outside(const Hit *hit, real_n distance, int axis) { return multiply_add(hit->geometric[axis], distance, hit->point[axis]); }
+HOT real_n hit_outside(const Hit *hit, real_n distance, int axis) { return multiply_add(hit->geometric[axis], distance, hit->point[axis]); }

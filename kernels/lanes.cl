@@ -3,6 +3,8 @@
 //
 // Out-of-line vector built-ins (select, any, fmin...) go through memory on PoCL; everything here compiles to plain vector instructions.
 #pragma OPENCL FP_CONTRACT OFF
+// Functions of the hot path: left to itself the compiler calls them, with vectors passed through memory.
+#define HOT static inline __attribute__((always_inline))
 #define PASTE_(a, b) a##b
 #define PASTE(a, b) PASTE_(a, b)
 
@@ -52,9 +54,9 @@ typedef PASTE(LANE_INT_NAME, LANES) mask_n;
 #define NO_LANES ((mask_n)(0))
 #define choose(m, a, b) ((m) ? (a) : (b))
 
-inline real_n min_n(real_n a, real_n b) { return choose(is_less(a, b), a, b); }
-inline real_n max_n(real_n a, real_n b) { return choose(is_greater(a, b), a, b); }
-inline real_n abs_n(real_n a) { return choose(is_less(a, (real_n)0), -a, a); }
+HOT real_n min_n(real_n a, real_n b) { return choose(is_less(a, b), a, b); }
+HOT real_n max_n(real_n a, real_n b) { return choose(is_greater(a, b), a, b); }
+HOT real_n abs_n(real_n a) { return choose(is_less(a, (real_n)0), -a, a); }
 
 // One mask test where the instruction set has it, a halving reduction elsewhere.
 #if LANES == 16 && REAL_BITS == 32 && defined(__AVX512DQ__) && defined(__clang__)
@@ -62,20 +64,20 @@ inline real_n abs_n(real_n a) { return choose(is_less(a, (real_n)0), -a, a); }
 #elif LANES == 8 && REAL_BITS == 64 && defined(__AVX512DQ__) && defined(__clang__)
 #define any_lane(m) (__builtin_ia32_cvtq2mask512(m) != 0)
 #elif LANES == 16
-inline int any_lane(mask_n m) {
+HOT int any_lane(mask_n m) {
     const PASTE(LANE_INT_NAME, 8) a = m.lo | m.hi;
     const PASTE(LANE_INT_NAME, 4) b = a.lo | a.hi;
     const PASTE(LANE_INT_NAME, 2) c = b.lo | b.hi;
     return (c.x | c.y) != 0;
 }
 #elif LANES == 8
-inline int any_lane(mask_n m) {
+HOT int any_lane(mask_n m) {
     const PASTE(LANE_INT_NAME, 4) b = m.lo | m.hi;
     const PASTE(LANE_INT_NAME, 2) c = b.lo | b.hi;
     return (c.x | c.y) != 0;
 }
 #elif LANES == 4
-inline int any_lane(mask_n m) {
+HOT int any_lane(mask_n m) {
     const PASTE(LANE_INT_NAME, 2) c = m.lo | m.hi;
     return (c.x | c.y) != 0;
 }
@@ -93,7 +95,7 @@ inline int any_lane(mask_n m) {
 #endif
 
 // The number of lanes set.
-inline int count_lanes(mask_n m) {
+HOT int count_lanes(mask_n m) {
     lane_int lane[LANES];
     store_lanes(m, lane);
     int n = 0;
@@ -102,15 +104,15 @@ inline int count_lanes(mask_n m) {
 }
 
 // Dot products may contract: |error| <= 3u |a||b| fused, 5u |a||b| unfused (Higham 2002, section 3.1); bounds elsewhere assume the larger.
-inline real_n dot_n(const real_n *a, const real_n *b) {
+HOT real_n dot_n(const real_n *a, const real_n *b) {
 #pragma OPENCL FP_CONTRACT ON
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
-inline real_n dot_uniform(const real_n *a, global const real *b) {
+HOT real_n dot_uniform(const real_n *a, global const real *b) {
 #pragma OPENCL FP_CONTRACT ON
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
-inline real_n multiply_add(real_n a, real_n b, real_n c) {
+HOT real_n multiply_add(real_n a, real_n b, real_n c) {
 #pragma OPENCL FP_CONTRACT ON
     return a * b + c;
 }

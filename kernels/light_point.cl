@@ -3,7 +3,7 @@
 
 // Adds weight * C * (Ka + sum of visible * Lrgb * (Kd N.L + Ks (R.V)^exponent)) to `color`. A light counts where it stands on the
 // viewer's side of both the shading and the true surface.
-inline void direct_light(const Geometry *geometry, global const Light *lights, int light_count, global const Material *materials,
+HOT void direct_light(const Geometry *geometry, global const Light *lights, int light_count, global const Material *materials,
                          const Rays *rays, const Hit *hit, real_n weight, real_n *sum) {
     real_n diffuse, specular, exponent;
     gather(diffuse, materials[hit->material[k]].diffuse);

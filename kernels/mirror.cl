@@ -1,6 +1,6 @@
 // Provides: mirror_weight: how much of the mirrored ray each hit shows.
 // Needs: hit.cl, structs.  Reads: nothing.
-inline real_n mirror_weight(global const Material *materials, const Hit *hit) {
+HOT real_n mirror_weight(global const Material *materials, const Hit *hit) {
     real_n weight;
     gather(weight, materials[hit->material[k]].reflect);
     return choose(hit->found, weight, (real_n)0);

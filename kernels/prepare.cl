@@ -2,7 +2,7 @@
 // Needs: lanes.cl, structs, triangle.cl.  Reads: nothing.
 //
 // All in float64, rounded once to `real`; the bounds are derived in triangle.cl.
-inline double length_double(const double *a) { return sqrt(dot_double(a, a)); }
+static inline double length_double(const double *a) { return sqrt(dot_double(a, a)); }
 
 kernel void prepare_triangles(global const double *vertices, double4 local_origin, global Triangle *triangles, int count) {
     const int slot = get_global_id(0);

@@ -6,13 +6,13 @@ typedef struct {
     lane_int count[LANES];
 } Media;
 
-inline void media_begin(Media *media) {
+static inline void media_begin(Media *media) {
     for (int k = 0; k < LANES; k++) media->count[k] = 0;
 }
 
 // Snell's law, ratio = n1 / n2: d' = r d + (r c - sqrt(k)) n with c = -d.n, k = 1 - r^2 (1 - c^2), and 1 - c^2 from the cross product,
 // which keeps its digits near normal incidence. Gives 1, 0 for total reflection, -1 where n faces away.
-inline int refraction_snell(const real *d, const real *n, real ratio, real *turned) {
+static inline int refraction_snell(const real *d, const real *n, real ratio, real *turned) {
     const real x = d[1] * n[2] - d[2] * n[1], y = d[2] * n[0] - d[0] * n[2], z = d[0] * n[1] - d[1] * n[0];
     const real c = -(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]), rest = R(1.0) - ratio * ratio * (x * x + y * y + z * z);
     if (c <= R(0.0)) return -1;
@@ -23,7 +23,7 @@ inline int refraction_snell(const real *d, const real *n, real ratio, real *turn
 
 // For each lane with Refract > 0: the refracted direction and the media behind the surface; its weight; or the weight that total
 // internal reflection hands to the reflected ray. A hit on an object that the ray is inside of leaves it, any other enters.
-inline void refraction_turn(global const Material *materials, global const Surface *surfaces, int triangle_slots, int object_count,
+static inline void refraction_turn(global const Material *materials, global const Surface *surfaces, int triangle_slots, int object_count,
                             const Rays *rays, const Hit *hit, const Media *before, real_n *direction, Media *after, real_n *weight,
                             real_n *reflected) {
     real d[3][LANES], n[3][LANES], g[3][LANES], through[LANES], back[LANES];

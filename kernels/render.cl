@@ -1,12 +1,13 @@
 // Provides: kernel render: one packet of pixels a work-item, from the camera's rays to linear colour.
 // Needs: camera.cl, scene.cl, hit.cl and what the effects add.  Reads: PACKET_WIDTH, PACKET_HEIGHT.
-kernel void render(global const Frame *frame, global const int2 *nodes, global const int *indices, global const Triangle *triangles,
-                   global const EdgePlanes *eye_planes, global const double *vertices, global const Object *objects,
-                   global const Surface *surfaces, global const Material *materials, int first_row, int end_row, global float *film
+
+// One packet, apart from the kernel: PoCL makes three copies of a kernel's body, and one of this.
+static __attribute__((noinline)) void
+render_packet(const int column, const int row, global const Frame *frame, global const int2 *nodes, global const int *indices,
+                   global const Triangle *triangles, global const EdgePlanes *eye_planes, global const double *vertices, global const Object *objects,
+                   global const Surface *surfaces, global const Material *materials, int end_row, global float *film
                    //@ parameters
 ) {
-    const int column = get_global_id(0) * PACKET_WIDTH, row = first_row + get_global_id(1) * PACKET_HEIGHT;
-    if (column >= frame->width || row >= end_row) return;
     Geometry geometry;
     geometry.nodes = nodes;
     geometry.indices = indices;
@@ -57,4 +58,18 @@ kernel void render(global const Frame *frame, global const int2 *nodes, global c
         for (int a = 0; a < 3; a++) film[3 * ((size_t)y * frame->width + x) + a] = (float)out[a][k];
     }
     //@ end
+}
+
+// The hint keeps a compiler's own vectoriser (Intel's) off lanes that are vectors already: it would take seconds, for slower code.
+kernel __attribute__((vec_type_hint(real_n)))
+void render(global const Frame *frame, global const int2 *nodes, global const int *indices, global const Triangle *triangles,
+            global const EdgePlanes *eye_planes, global const double *vertices, global const Object *objects,
+            global const Surface *surfaces, global const Material *materials, int first_row, int end_row, global float *film
+            //@ parameters
+) {
+    const int column = get_global_id(0) * PACKET_WIDTH, row = first_row + get_global_id(1) * PACKET_HEIGHT;
+    if (column >= frame->width || row >= end_row) return;
+    render_packet(column, row, frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces, materials, end_row, film
+                  //@ arguments
+    );
 }

@@ -8,7 +8,7 @@
 //
 // word * 2^-32 in float32 rounds words from 2^32 - 128 on up to 1, where log(1 - u) is infinite and a table is read past its end.
 // Here the greatest value is 1 - 2^-24 (1 - 2^-32), so 1 - u, exact as well, is never 0.
-inline real uniform_from_word(uint word) {
+static inline real uniform_from_word(uint word) {
 #if REAL_BITS == 64
     return word * 0x1p-32;
 #else

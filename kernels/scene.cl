@@ -1,6 +1,6 @@
 // Provides: scene_trace: rays through every object of the scene, one tree after the other.
 // Needs: kdtree.cl, geometry.cl.  Reads: nothing.
-inline void scene_trace(const Geometry *geometry, const Rays *rays, const int shared_origin, const int any_hit, Hits *hits) {
+HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int shared_origin, const int any_hit, Hits *hits) {
     mask_n active = rays->active;
     for (int b = 0; b < geometry->object_count; b++) {
         kdtree_trace(geometry, geometry->objects + b, rays, active, shared_origin, any_hit, hits);

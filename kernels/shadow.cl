@@ -3,7 +3,7 @@
 
 // Traced from the light, whose rays share it as their origin, to the point: it ends off the surface by the point's error and the
 // ray's own (4u of its length and of the light's position), starts as far from the light, and passes by the primitive it ends on.
-inline mask_n shadow_lit(const Geometry *geometry, global const Light *light, int index, const Hit *hit, mask_n lit) {
+HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int index, const Hit *hit, mask_n lit) {
     Geometry seen = *geometry;
     seen.planes = geometry->light_planes + (size_t)index * geometry->slot_count;
     Rays rays;

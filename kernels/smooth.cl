@@ -2,7 +2,7 @@
 // Needs: hit.cl, geometry.cl.  Reads: nothing.
 
 // Barycentric weights are ratios of areas seen along the normal, n.(e x (p - v0)) / n.n; weights outside [0, 1] by rounding are clamped.
-inline void smooth_normals(const Geometry *geometry, Hit *hit) {
+static inline void smooth_normals(const Geometry *geometry, Hit *hit) {
     real p[3][LANES], smooth[3][LANES];
     for (int a = 0; a < 3; a++) {
         store_lanes(hit->point[a], p[a]);

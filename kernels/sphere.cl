@@ -8,7 +8,7 @@
 // Sphere k of the scene has the slot slot_count + k. A ray that starts on a sphere meets that one at its second root only
 // (t = -2 f.d, inwards). A ray that ends on it (any_hit) leaves out the root at its end, and may meet the other: the far wall,
 // where the end is seen from inside.
-inline void sphere_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
+HOT void sphere_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
     for (int i = 0; i < geometry->sphere_count; i++) {
         global const Sphere *sphere = geometry->spheres + i;
         const mask_n own = is_equal(rays->skip, (mask_n)(geometry->slot_count + i));
@@ -34,7 +34,7 @@ inline void sphere_trace(const Geometry *geometry, const Rays *rays, const int a
 
 // Overwrites what hit_surface found for the lanes that hit a sphere: the point is put back onto the sphere along
 // its radius, where its error is that of the rounded centre and radius.
-inline void sphere_surface(const Geometry *geometry, Hit *hit) {
+HOT void sphere_surface(const Geometry *geometry, Hit *hit) {
     mask_n round = hit->found & is_at_least(load_lanes(hit->slot), (mask_n)geometry->slot_count);
     if (!any_lane(round)) return;
     global const Sphere *spheres = geometry->spheres;

@@ -6,7 +6,7 @@
 //   other rays have T = n.(v0 - o) off by u |v0| + 5u |v0 - o| more; the shared origin itself is rounded by u |o|;
 //   o + t d is rounded by u (|o| + t).
 // Together below 8u (scale + t), with scale as rays.cl has it.
-inline void hit_surface(const Geometry *geometry, global const Frame *frame, global const Surface *surfaces, const Rays *rays,
+HOT void hit_surface(const Geometry *geometry, global const Frame *frame, global const Surface *surfaces, const Rays *rays,
                         const Hits *hits, Hit *hit) {
     hit->found = is_at_least(hits->slot, NO_LANES);
     store_lanes(choose(hit->found, hits->slot, NO_LANES), hit->slot);

@@ -1,4 +1,4 @@
-// Provides: edge_functions: on which side of a triangle's three edges its rays pass; hit_distance; ray_given.
+// Provides: edge_functions: on which side of a triangle's three edges its rays pass; plane_hit; ray_given.
 // Needs: lanes.cl, rays.cl, geometry.cl.  Reads: nothing.
 //
 // Rays that share their origin o (the eye, a point light) use planes through o and each edge, N = b x c of the corners seen from o,
@@ -14,7 +14,7 @@ typedef struct {
     real_n bound;            // each edge function's error is below it
 } EdgeFunctions;
 
-inline EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin) {
+HOT EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin) {
     real_n u, v, w;
     EdgeFunctions f;
     if (shared_origin) {
@@ -41,33 +41,46 @@ inline EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, 
     return f;
 }
 
-// The distance to the triangle's plane; `grazing` lanes run so nearly inside the plane that it means nothing.
-inline real_n hit_distance(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n *grazing) {
-    global const Triangle *triangle = geometry->triangles + slot;
-    real_n offset, rate;
+// The distance to the triangle's plane, t = offset / rate with offset = n.(v0 - o), rate = n.d.
+//   rate is off by (1 + 3)u |n||d|, offset by u of itself (shared origin, from float64) or by 8u reach |n| (rounded origin and corner,
+//   difference, dot product), the quotient by u: with |rate| <= |n||d|, t is off by less than (2 |t|) (8u |n|) / |rate|, or
+//   2 (|t| + reach) (8u |n|) / |rate|; normal_bound is 8u |n|.
+typedef struct {
+    real_n t, error;
+    mask_n grazing;  // lanes that run so nearly inside the plane that t means nothing
+} PlaneHit;
+
+HOT PlaneHit plane_hit(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin) {
+    real_n offset, rate, normal_bound, inherited = (real_n)0;
     if (shared_origin) {
         global const EdgePlanes *plane = geometry->planes + slot;
         offset = (real_n)plane->offset;
         rate = dot_uniform(rays->direction, plane->normal);
-        *grazing = is_at_most(abs_n(rate), (real_n)plane->normal_bound);
+        normal_bound = (real_n)plane->normal_bound;
     } else {
+        global const Triangle *triangle = geometry->triangles + slot;
         const real_n to_corner[3] = {triangle->v0[0] - rays->origin[0], triangle->v0[1] - rays->origin[1], triangle->v0[2] - rays->origin[2]};
         offset = dot_uniform(to_corner, triangle->normal);
         rate = dot_uniform(rays->direction, triangle->normal);
-        *grazing = is_at_most(abs_n(rate), (real_n)triangle->normal_bound);
+        normal_bound = (real_n)triangle->normal_bound;
+        inherited = reach;
     }
-    return offset / rate;
+    PlaneHit hit;
+    hit.t = offset / rate;
+    hit.error = R(2.0) * (abs_n(hit.t) + inherited) * abs_n(normal_bound / rate);
+    hit.grazing = is_at_most(abs_n(rate), normal_bound);
+    return hit;
 }
 
-inline void cross_double(const double *a, const double *b, double *c) {
+HOT void cross_double(const double *a, const double *b, double *c) {
     c[0] = a[1] * b[2] - a[2] * b[1];
     c[1] = a[2] * b[0] - a[0] * b[2];
     c[2] = a[0] * b[1] - a[1] * b[0];
 }
-inline double dot_double(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+HOT double dot_double(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // One lane's ray by the numbers as given: origin, direction, and the open interval of t in units of the direction's length.
-inline void ray_given(const Geometry *geometry, const Rays *rays, int lane, const int shared_origin, double *origin, double *direction,
+HOT void ray_given(const Geometry *geometry, const Rays *rays, int lane, const int shared_origin, double *origin, double *direction,
                       double *t_min, double *t_max) {
     //@ ray_given
     real along[LANES], from[LANES];
@@ -84,7 +97,7 @@ inline void ray_given(const Geometry *geometry, const Rays *rays, int lane, cons
 }
 
 // The length of the direction as given, which turns its t into one along the unit direction that lanes use.
-inline double ray_length(const Rays *rays, int lane) {
+HOT double ray_length(const Rays *rays, int lane) {
     //@ ray_length
     return 1.0;
 }

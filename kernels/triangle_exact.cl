@@ -5,22 +5,8 @@
 // decided as in the other rungs. The lanes left are decided in float64 with bounds, and those left of them in exact expansions
 // (exact.cl). Hits carry t as an interval [low, t]; of equal t the lowest primitive id stays.
 
-// t is off by the relative error |n| 8u / |rate| of triangle.cl (8u at the least, as |rate| <= |n|(1 + 4u)), and for rays of their
-// own origin by 8u reach |n| / |rate| more, for the rounded origin and corner; `normal_bound` is 8u |n|.
-inline real_n distance_error(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, real_n t) {
-    real_n rate, normal_bound;
-    if (shared_origin) {
-        rate = dot_uniform(rays->direction, geometry->planes[slot].normal);
-        normal_bound = (real_n)geometry->planes[slot].normal_bound;
-        return R(2.0) * abs_n(t) * normal_bound / abs_n(rate);
-    }
-    rate = dot_uniform(rays->direction, geometry->triangles[slot].normal);
-    normal_bound = (real_n)geometry->triangles[slot].normal_bound;
-    return R(2.0) * (abs_n(t) + reach) * normal_bound / abs_n(rate);
-}
-
 // The lanes in `unsure`, one by one, by the numbers as given: those that hit nearer than what they have; their t.
-__attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n unsure,
+static __attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n unsure,
                                                  const Hits *hits, real_n *distance) {
     lane_int test[LANES], best[LANES];
     real t[LANES];
@@ -62,21 +48,27 @@ __attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry, const
     return load_lanes(test);
 }
 
-inline void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, mask_n live, Hits *hits) {
+HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, mask_n live, Hits *hits) {
     const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared_origin);
     mask_n possible = live & (is_at_least(f.lowest, -f.bound) | is_at_most(f.highest, f.bound));
     if (!any_lane(possible)) return;
-    mask_n grazing;
-    real_n t = hit_distance(geometry, rays, slot, shared_origin, &grazing);
-    real_n error = distance_error(geometry, rays, reach, slot, shared_origin, t);
+    const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared_origin);
+    real_n t = plane.t, error = plane.error;
     const mask_n outside = is_less(t + error, rays->t_min) | is_greater(t - error, hits->t);
-    possible &= (grazing | ~outside) & ~is_equal(rays->skip, (mask_n)slot);
-    mask_n hit = possible & ~grazing & (is_greater(f.lowest, f.bound) | is_less(f.highest, -f.bound));
+    // The triangle that the ray already has, met again in another leaf, is nothing new.
+    possible &= (plane.grazing | ~outside) & ~is_equal(rays->skip, (mask_n)slot) & ~is_equal(hits->slot, (mask_n)slot);
+    mask_n hit = possible & ~plane.grazing & (is_greater(f.lowest, f.bound) | is_less(f.highest, -f.bound));
     hit &= is_greater(t - error, rays->t_min) & is_less(t + error, hits->low);
     //@ accept_sure
     const mask_n unsure = possible & ~hit;
     if (any_lane(unsure)) {
-        const mask_n found = triangle_unsure(geometry, rays, slot, shared_origin, unsure, hits, &t);
+        // Copies go to the function: what it is given by pointer could not stay in registers here.
+        const Geometry seen = *geometry;
+        const Rays copy = *rays;
+        const Hits before = *hits;
+        real_n distance = t;
+        const mask_n found = triangle_unsure(&seen, &copy, slot, shared_origin, unsure, &before, &distance);
+        t = distance;
         error = choose(found, (R(4.0) * UNIT_ROUNDOFF) * abs_n(t), error);
         hit |= found;
     }
@@ -87,6 +79,9 @@ inline void triangle_test(const Geometry *geometry, const Rays *rays, real_n rea
 
 //@hook parameters
                    , volatile global int *decided
+//@end
+//@hook arguments
+                  , decided
 //@end
 //@hook geometry_members
     volatile global int *decided;        // lanes decided in float64, in expansions

@@ -1,12 +1,12 @@
 // Provides: triangle_test of the rung `fast`: signs of rounded edge functions, no promise at edges.
 // Needs: lanes.cl, rays.cl, geometry.cl, triangle.cl.  Reads: nothing.
-inline void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, mask_n live, Hits *hits) {
+HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, mask_n live, Hits *hits) {
     const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared_origin);
     mask_n hit = live & (is_at_least(f.lowest, (real_n)0) | is_at_most(f.highest, (real_n)0));
     if (!any_lane(hit)) return;
-    mask_n grazing;
-    const real_n t = hit_distance(geometry, rays, slot, shared_origin, &grazing);
-    hit &= ~grazing & is_greater(t, rays->t_min) & is_less(t, hits->t) & ~is_equal(rays->skip, (mask_n)slot);
+    const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared_origin);
+    const real_n t = plane.t;
+    hit &= ~plane.grazing & is_greater(t, rays->t_min) & is_less(t, hits->t) & ~is_equal(rays->skip, (mask_n)slot);
     //@ accept
     hits->t = choose(hit, t, hits->t);
     hits->slot = choose(hit, (mask_n)slot, hits->slot);

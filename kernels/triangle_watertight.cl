@@ -6,7 +6,7 @@
 // distance, where both neighbours report the hit and the nearer one stays. The traversal loses no cell (kdtree.cl).
 
 // Lanes that run nearly inside the plane: decided in float64, with the same rule. Rare, so kept out of the loop's registers.
-__attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n unsure,
+static __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n unsure,
                                                   real_n *distance) {
     lane_int test[LANES];
     real t[LANES];
@@ -41,14 +41,21 @@ __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometry, cons
     return load_lanes(test);
 }
 
-inline void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, mask_n live, Hits *hits) {
+HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, mask_n live, Hits *hits) {
     const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared_origin);
     mask_n hit = live & (is_at_least(f.lowest, -f.bound) | is_at_most(f.highest, f.bound));
     if (!any_lane(hit)) return;
-    mask_n grazing;
-    real_n t = hit_distance(geometry, rays, slot, shared_origin, &grazing);
-    grazing &= hit;
-    if (any_lane(grazing)) hit = (hit & ~grazing) | triangle_grazing(geometry, rays, slot, shared_origin, grazing, &t);
+    const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared_origin);
+    real_n t = plane.t;
+    const mask_n grazing = plane.grazing & hit;
+    if (any_lane(grazing)) {
+        // Copies go to the function: what it is given by pointer could not stay in registers here.
+        const Geometry seen = *geometry;
+        const Rays copy = *rays;
+        real_n distance = t;
+        hit = (hit & ~grazing) | triangle_grazing(&seen, &copy, slot, shared_origin, grazing, &distance);
+        t = distance;
+    }
     hit &= is_greater(t, rays->t_min) & is_less(t, hits->t) & ~is_equal(rays->skip, (mask_n)slot);
     //@ accept
     hits->t = choose(hit, t, hits->t);

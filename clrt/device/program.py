@@ -150,7 +150,8 @@ def compose(features: Features, precision: Precision, lanes: int, shape: Shape, 
     if counting:
         files.insert(0, "count.cl")
     hooks: dict[str, list[tuple[str, str, int]]] = {
-        "parameters": [("features", f"                   , {c}\n", 1) for f in features.active for _, c in f.parameters]
+        "parameters": [("features", f"                   , {c}\n", 1) for f in features.active for _, c in f.parameters],
+        "arguments": [("features", f"                  , {name}\n", 1) for f in features.active for name, _ in f.parameters],
     }
     for name in files:
         for place, code, line in kernel_source(name)[1]:
