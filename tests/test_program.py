@@ -106,6 +106,12 @@ def test_unsafe_build_options_are_refused(device: Device, option: str) -> None:
         program.build(device, "kernel void f() {}", (option,))
 
 
+def test_unsafe_options_of_the_environment_are_refused(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYOPENCL_BUILD_OPTIONS", "-cl-fast-relaxed-math")
+    with pytest.raises(DeviceError, match="fast-relaxed-math"):
+        program.build(device, "kernel void f() {}")
+
+
 def test_unknown_precision_names_the_rungs() -> None:
     with pytest.raises(ClrtError, match=", ".join(RUNGS)):
         rung("sloppy")

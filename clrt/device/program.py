@@ -11,6 +11,7 @@ Every chunk of the composed text starts with `#line 1 "name.cl"`, so that a comp
 
 from __future__ import annotations
 
+import os
 import re
 import warnings
 from collections.abc import Iterator
@@ -201,7 +202,7 @@ def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> An
     """
     import pyopencl as cl
 
-    check_options(options)
+    check_options((*options, *os.environ.get("PYOPENCL_BUILD_OPTIONS", "").split()))  # pyopencl adds these to ours
     error: Exception | None = None
     for text in (source, source + "\n// built again, past the cache\n"):
         try:
