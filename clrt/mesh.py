@@ -72,7 +72,7 @@ def check_mesh(
     bad = np.flatnonzero(used & ~np.isfinite(points).all(axis=1))
     if len(bad):
         face = int(np.flatnonzero((corners == bad[0]).any(axis=1))[0])
-        raise MeshError(f"{name}: face {face} has vertex {bad[0]}, which is {points[bad[0]].tolist()}, and {len(bad) - 1} more vertices "
+        raise MeshError(f"{name}: face {face} has vertex {bad[0]} at {points[bad[0]].tolist()}, and {len(bad) - 1} more vertices "
                         "are not finite; repair the mesh in the program that made it")  # fmt: skip
     return points, corners
 
