@@ -213,8 +213,8 @@ def in_plane(context: Context) -> Outcome:
         along[(along == 0).all(axis=1)] = 1
         parts.append(rays_of(start[:, :1] * s + start[:, 1:] * u + shift, along[:, :1] * s + along[:, 1:] * u))
     wrong, missed = [], 0
-    for number, (corners, rays) in enumerate(zip(triangles, parts, strict=True)):
-        tri = corners.astype(np.float32)
+    for number, (plane, rays) in enumerate(zip(triangles, parts, strict=True)):
+        tri = plane.astype(np.float32)
         wrong.append(_touching(context, ("in plane", number), tri, rays))
         missed += int(np.count_nonzero(naive.brute_force(tri, rays, MoellerTrumbore(nan_hits=True))[0] >= 0))
     return Outcome(planes * per_plane, plus(*wrong), missed, "naive: NaN passes its comparisons")
