@@ -48,7 +48,7 @@ class Plan:
 
 FULL = Plan()
 QUICK = Plan(
-    rounds=2, sizes=(32, 64), sample=16, brute_limit=1_000_000, brute_count_size=16, versus_size=64, count_size=64, command_size=64
+    rounds=2, sizes=(32,), sample=16, brute_limit=500_000, brute_count_size=16, versus_size=64, count_size=64, command_size=64
 )  # fmt: skip
 
 
@@ -104,14 +104,18 @@ def _sampled(bench: BenchScene, size: int, plan: Plan, device: Device) -> list[d
     empty_s, brute_s, rows = series["empty launch"], series[f"{_BASELINE}, sample"], []
     for tree in TREES:
         stats, sample, sample_s = figures(scene, tree, device), figures(small, tree, device), series[f"{tree}, sample"]
-        share = (stats.rays or 0) / (sample.rays or 1)
-        estimate = empty_s.best + (brute_s.best - empty_s.best) * share
+        estimate = whole_from_sample(brute_s.best, empty_s.best, sample.rays or 1, stats.rays or 0)
         rows.append(_row(stats, series[tree]) | {
             "sample": {"size": plan.sample, "rays": sample.rays, "tree_s": sample_s.to_json(), "empty_launch_s": empty_s.to_json()},
             "brute_s": brute_s.to_json(), "brute_picture_s": estimate, "speed_up": estimate / series[tree].best,
             "speed_up_same_rays": _ratio(brute_s.best - empty_s.best, sample_s.best - empty_s.best),
         })  # fmt: skip
     return rows
+
+
+def whole_from_sample(sample_s: float, empty_s: float, sample_rays: int, rays: int) -> float:
+    """Seconds of one launch over `rays`, from one over `sample_rays` of the same kind and an empty one."""
+    return empty_s + (sample_s - empty_s) * rays / sample_rays
 
 
 def _ratio(longer: float, shorter: float) -> float | None:

@@ -50,9 +50,7 @@ def absent_bytes(source: str, absent: list[Feature], active: tuple[Feature, ...]
     files = {f.kernel for f in absent}
     names = {name for f in absent for name in _names(f)} - {name for f in active for name in _names(f)}
     word = re.compile(rf"\b({'|'.join(sorted(names))})\b") if names else None
-    return sum(
-        len(line.encode()) + 1 for file, line in _lines_by_file(source) if file in files or (word is not None and word.search(line))
-    )
+    return sum(len(line.encode()) + 1 for file, line in _lines_by_file(source) if file in files or (word is not None and word.search(line)))
 
 
 def _names(feature: Feature) -> list[str]:

@@ -33,7 +33,7 @@ from clrt.scene.model import Scene
 Bools = NDArray[np.bool_]
 
 #: what the difference of two of clrt's pictures tells: what shadow rays alone cost
-_DARK, _LIT, _SHADOWED = "clrt without lights", "clrt lit, no shadows", "clrt lit, with shadows"
+DARK, LIT, SHADOWED = "clrt without lights", "clrt lit, no shadows", "clrt lit, with shadows"
 
 
 def opened(scene: Scene, tree: str, device: Device, without: str | None = None) -> Tracer:
@@ -47,9 +47,9 @@ def measure_versus(bench: BenchScene, size: int, rounds: int, device: Device) ->
     """Times of both tracers over the same rays of a square picture, in turns; their rays, and where they differ in what they hit."""
     scene = straight(bench.scene).with_size(size, size)
     tracers = {
-        _DARK: opened(replace(scene, lights=()), "sah", device),
-        _LIT: opened(scene, "sah", device, without="shadows"),
-        _SHADOWED: opened(scene, "sah", device),
+        DARK: opened(replace(scene, lights=()), "sah", device),
+        LIT: opened(scene, "sah", device, without="shadows"),
+        SHADOWED: opened(scene, "sah", device),
     }
     counted = render(scene, device=device.info.name, count=True).stats
     assert counted is not None  # a renderer's picture has figures
@@ -65,7 +65,7 @@ def measure_versus(bench: BenchScene, size: int, rounds: int, device: Device) ->
     if embreex_available():
         result["pixels_that_differ"] = _differences(found, sees, tracers)
     result["seconds"] = {name: times.to_json() for name, times in series.items()}
-    return result | {"rates": _rates(series, result["rays"])}
+    return result | {"rates": rates_of(series, result["rays"])}
 
 
 def _load_rays(peer: Embreex, scene: Scene, result: dict[str, Any]) -> tuple[Bools, Bools]:
@@ -92,16 +92,16 @@ def cores_used(run: Callable[[], object]) -> float:
 
 def _differences(found: Bools, sees: Bools, tracers: dict[str, Tracer]) -> dict[str, int]:
     """Pixels where only one of the tracers hits anything, and where only one sees the light. Matt surfaces have an ambient part."""
-    dark, lit = tracers[_DARK].picture(), tracers[_SHADOWED].picture()
+    dark, lit = tracers[DARK].picture(), tracers[SHADOWED].picture()
     hit, bright = (dark != 0.0).any(axis=-1).ravel(), (lit != dark).any(axis=-1).ravel()
     return {"hit": int(np.count_nonzero(hit != found)), "lit": int(np.count_nonzero(bright != sees))}
 
 
-def _rates(series: dict[str, Series], rays: dict[str, Any]) -> dict[str, dict[str, float]]:
+def rates_of(series: dict[str, Series], rays: dict[str, Any]) -> dict[str, dict[str, float]]:
     """Million rays a second by tracer and kind, by the best times; `both`: primary and shadow rays together."""
     best = {name: times.best for name, times in series.items()}
-    shadow = max(best[_SHADOWED] - best[_LIT], 1e-9)
-    rates = {"clrt": _millions(rays["clrt"], best[_DARK], shadow, best[_SHADOWED])}
+    shadow = max(best[SHADOWED] - best[LIT], 1e-9)
+    rates = {"clrt": _millions(rays["clrt"], best[DARK], shadow, best[SHADOWED])}
     if "embreex" in rays:
         primary, shadow = best["embreex primary"], best["embreex shadow"]
         rates["embreex"] = _millions(rays["embreex"], primary, shadow, primary + shadow)
