@@ -49,15 +49,13 @@ def far_off(t: F64, expected: F64, ulps: float = ULPS) -> Bools:
 def disagreements(rung: str, hits: NDArray[np.void], expected: Truth) -> Bools:
     """Rays on which a rung breaks its word (m,).
 
-    exact: another triangle than the oracle's, or a t that is off. The others: a true hit that is reported as a miss; they may take the
-    neighbour of the triangle at an edge. All: an answer that is no number.
+    exact: another triangle than the oracle's. The others: a true hit that is reported as a miss; they may take the neighbour of the
+    triangle at an edge. All: an answer that is no number, or where the triangle is the same, a t that is off.
     """
-    bad = unusable(hits)
     hit = expected.prim_id >= 0
-    if rung != "exact":
-        return np.asarray(bad | (hit & (hits["prim_id"] < 0)))
     same = hits["prim_id"] == expected.prim_id
-    return np.asarray(bad | ~same | (hit & same & far_off(hits["t"], np.where(hit, expected.t, 0.0))))
+    wrong = ~same if rung == "exact" else hit & (hits["prim_id"] < 0)
+    return np.asarray(wrong | unusable(hits) | (hit & same & far_off(hits["t"], np.where(hit, expected.t, 0.0))))
 
 
 def against(context: Context, key: Hashable, tri: Triangles, rays: Rays, expected: Truth) -> dict[str, int | None]:
