@@ -71,8 +71,10 @@ def _version(package: str) -> str | None:
 
 
 def _commit() -> str | None:
-    """The checkout's commit, with a plus sign where its files have been changed since; None without git."""
-    folder = Path(__file__).parent
+    """The checkout's commit, with a plus sign where its files have been changed since; None without git or a checkout."""
+    folder = Path(__file__).resolve().parents[2]
+    if not (folder / "pyproject.toml").is_file():
+        return None
     try:
         head, changed = (
             subprocess.run(["git", *command], cwd=folder, capture_output=True, text=True, check=True, timeout=10).stdout.strip()
