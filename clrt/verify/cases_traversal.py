@@ -153,10 +153,11 @@ def through_crossing(context: Context) -> Outcome:
 
 
 def _mixed(rng: Random) -> Triangles:
-    """A few large triangles through a soup of small ones."""
+    """A few large triangles and axis-parallel quads through a soup of small triangles."""
     vertices, faces = soup(300, seed=1)
     large = rng.uniform(-1, 1, (12, 3, 3))
-    return np.concatenate([vertices[faces], large]).astype(np.float32)
+    flat = [quad(rng.uniform(-0.8, 0.8, 3), np.eye(3)[a - 1] * 0.2, np.eye(3)[a - 2] * 0.2) for a in rng.integers(0, 3, 60)]
+    return np.concatenate([vertices[faces], large, *flat]).astype(np.float32)
 
 
 @case(23, "hit found beyond the current cell", provokes="premature accept or reject", oracle="B")
@@ -169,7 +170,7 @@ def beyond_cell(context: Context) -> Outcome:
     target = rng.uniform(-1, 1, (context.rays, 3))
     along = np.concatenate([free, parallel])
     rays = rays_of(target - 3 * along, along)
-    tree = naive_tree.build(tri, 10)
+    tree = naive_tree.build(tri, 10, naive_tree.closed)
     early = _naive_losses(tri, rays, tree, Habits(stop_at_hit=True))
     rejected = _naive_losses(tri, rays, tree, Habits(inside_cell=True))
     counts = _against_brute_force(context, "mixed", tri, rays)
@@ -255,7 +256,7 @@ def spanning(context: Context) -> Outcome:
         return int(naive_tree.walk(tree, centered, moved).tests.mean() > len(tri))
 
     tests = naive_tree.walk(naive_tree.build(tri, 14, middle=True), tri, some).tests
-    return Outcome(count, plus(counts, context.each_rung(too_many)), int(np.count_nonzero(tests > len(tri))), "naive: cells are halved to a depth")
+    return Outcome(count, plus(counts, context.each_rung(too_many)), int(np.count_nonzero(tests > len(tri))), "naive: halves cells")
 
 
 def _middle(tri: Triangles) -> Array:
@@ -266,15 +267,15 @@ def _middle(tri: Triangles) -> Array:
 def depth_limit(context: Context) -> Outcome:
     """Smaller and smaller clusters toward a corner: every octave asks for splits of its own. Fails where no tree reaches the limit."""
     rng = context.rng(28)
-    octave = 2.0 ** -np.arange(48)[:, None, None, None]
-    cluster = 0.6 + 0.1 * rng.uniform(-1, 1, (48, 12, 1, 3)) + 0.05 * rng.uniform(-1, 1, (48, 12, 3, 3))
-    tri = (cluster * octave).reshape(-1, 3, 3).astype(np.float32)
-    which = np.minimum(rng.geometric(0.06, context.rays) - 1, 47) * 12 + rng.integers(0, 12, context.rays)
-    target = on_faces(rng, context.rays, tri, which)
+    count, octaves = context.share(0.2), 24
+    scale = 2.0 ** -np.arange(octaves)[:, None, None, None]
+    cluster = 0.6 + 0.1 * rng.uniform(-1, 1, (octaves, 12, 1, 3)) + 0.05 * rng.uniform(-1, 1, (octaves, 12, 3, 3))
+    tri = (cluster * scale).reshape(-1, 3, 3).astype(np.float32)
+    target = on_faces(rng, count, tri)
     span = np.abs(target).max(axis=1, keepdims=True)
-    half = context.rays // 2
-    near = toward((target + 2 * span * directions(rng, context.rays))[:half], target[:half])
-    rays = joined(near, toward(np.broadcast_to(np.float32([-1, -1, -1]), (context.rays - half, 3)), target[half:]))
+    half = count // 2
+    near = toward((target + 2 * span * directions(rng, count))[:half], target[:half])
+    rays = joined(near, toward(np.full((count - half, 3), -1.0), target[half:]))
     counts = _against_brute_force(context, "octaves", tri, rays)
     shallow = context.each_rung(lambda rung: int(_deepest(context, "octaves", tri, rung) < default_max_depth(len(tri))))
     lost = _naive_losses(tri, rays, naive_tree.build(tri, 60), Habits(stack=8))

@@ -81,15 +81,16 @@ def leaks(context: Context, key: Hashable, tri: Triangles, rays: Rays) -> dict[s
 def lost_in_tree(tri: Triangles, rays: Rays, by_tree: Truth, by_brute_force: Truth, exactly: bool) -> int:
     """Rays whose hit the tree has lost, against the same predicate on all triangles.
 
-    A rounded predicate may also accept a triangle that the ray misses by a hair; whether a traversal meets that one is chance. So a
-    difference counts only where rational arithmetic says that the nearer of the two answers is truly hit. `exactly`: every one counts.
+    exactly : any difference counts. Otherwise the tree's answer must be farther by more than the rounding of t, since either neighbour
+    may be taken at an edge, and rational arithmetic must confirm the nearer hit: a rounded predicate may also accept a triangle that the
+    ray misses by a hair, and whether a traversal meets that one is chance.
     """
-    differ = (by_tree.t != by_brute_force.t) | (exactly & (by_tree.prim_id != by_brute_force.prim_id))
-    rows = np.flatnonzero(differ)
-    if exactly or not rows.size:
-        return int(rows.size)
-    nearer = np.where(by_tree.t < by_brute_force.t, by_tree.prim_id, by_brute_force.prim_id)[rows]
-    parts = (tri[nearer], rays.origins[rows], rays.directions[rows])
+    if exactly:
+        return int(np.count_nonzero((by_tree.t != by_brute_force.t) | (by_tree.prim_id != by_brute_force.prim_id)))
+    found = by_brute_force.prim_id >= 0
+    farther = found & (by_tree.t > by_brute_force.t)
+    rows = np.flatnonzero(farther & far_off(by_tree.t, np.where(found, by_brute_force.t, 0.0)))
+    parts = (tri[by_brute_force.prim_id[rows]], rays.origins[rows], rays.directions[rows])
     return int(rational.evaluate(*(np.asarray(x, np.float64) for x in parts))[0].sum())
 
 

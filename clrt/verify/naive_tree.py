@@ -26,6 +26,11 @@ def strictly(lo: F32, hi: F32, corners: F32, axis: int, plane: np.float32) -> tu
     return lo[:, axis] < plane, hi[:, axis] > plane
 
 
+def closed(lo: F32, hi: F32, corners: F32, axis: int, plane: np.float32) -> tuple[Bools, Bools]:
+    """The careful one: closed ranges, so that nothing is lost."""
+    return lo[:, axis] <= plane, hi[:, axis] >= plane
+
+
 def by_clipped_area(lo: F32, hi: F32, corners: F32, axis: int, plane: np.float32) -> tuple[Bools, Bools]:
     """By the area of the clipped piece's box, in float32: a sliver whose box has none is dropped."""
     return _has_area(corners, axis, plane, 1), _has_area(corners, axis, plane, -1)
