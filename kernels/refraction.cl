@@ -10,11 +10,11 @@ static inline void media_begin(Media *media) {
     for (int k = 0; k < LANES; k++) media->count[k] = 0;
 }
 
-// Snell's law, ratio = n1 / n2: d' = r d + (r c - sqrt(k)) n with c = -d.n, k = 1 - r^2 (1 - c^2), and 1 - c^2 from the cross product,
-// which keeps its digits near normal incidence. Gives 1, 0 for total reflection, -1 where n faces away.
-static inline int refraction_snell(const real *d, const real *n, real ratio, real *turned) {
-    const real x = d[1] * n[2] - d[2] * n[1], y = d[2] * n[0] - d[0] * n[2], z = d[0] * n[1] - d[1] * n[0];
-    const real c = -(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]), rest = R(1.0) - ratio * ratio * (x * x + y * y + z * z);
+// Snell's law, ratio r = n1 / n2: d' = r d + (r c - sqrt(k)) n with c = -d.n and k = 1 - r^2 (1 - c^2), taken as (1 - r)(1 + r) + (r c)^2:
+// no difference of nearly equal numbers but at the critical angle itself, and for r = 1 the root is c to the last bit, so d' is d.
+// Gives 1, 0 for total reflection, -1 where n faces away.
+inline int refraction_snell(const real *d, const real *n, real ratio, real *turned) {
+    const real c = -(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]), rest = (R(1.0) - ratio) * (R(1.0) + ratio) + (ratio * c) * (ratio * c);
     if (c <= R(0.0)) return -1;
     if (rest < R(0.0)) return 0;
     for (int a = 0; a < 3; a++) turned[a] = ratio * d[a] + (ratio * c - sqrt(rest)) * n[a];
