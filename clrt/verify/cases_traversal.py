@@ -167,10 +167,10 @@ def beyond_cell(context: Context) -> Outcome:
     tri = _mixed(rng)
     half = context.rays // 2
     free, parallel = directions(rng, context.rays - half), np.eye(3)[rng.integers(0, 3, half)]
-    target = rng.uniform(-1, 1, (context.rays, 3))
+    target = on_faces(rng, context.rays, tri)
     along = np.concatenate([free, parallel])
     rays = rays_of(target - 3 * along, along)
-    tree = naive_tree.build(tri, 10, naive_tree.closed)
+    tree = naive_tree.build(tri, 12, naive_tree.flat_below)
     early = _naive_losses(tri, rays, tree, Habits(stop_at_hit=True))
     rejected = _naive_losses(tri, rays, tree, Habits(inside_cell=True))
     counts = _against_brute_force(context, "mixed", tri, rays)

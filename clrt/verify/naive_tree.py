@@ -26,9 +26,9 @@ def strictly(lo: F32, hi: F32, corners: F32, axis: int, plane: np.float32) -> tu
     return lo[:, axis] < plane, hi[:, axis] > plane
 
 
-def closed(lo: F32, hi: F32, corners: F32, axis: int, plane: np.float32) -> tuple[Bools, Bools]:
-    """The careful one: closed ranges, so that nothing is lost."""
-    return lo[:, axis] <= plane, hi[:, axis] >= plane
+def flat_below(lo: F32, hi: F32, corners: F32, axis: int, plane: np.float32) -> tuple[Bools, Bools]:
+    """The careful one: a triangle flat in the plane goes to the lower child, so that nothing is lost."""
+    return (lo[:, axis] < plane) | (hi[:, axis] <= plane), hi[:, axis] > plane
 
 
 def by_clipped_area(lo: F32, hi: F32, corners: F32, axis: int, plane: np.float32) -> tuple[Bools, Bools]:
