@@ -21,6 +21,7 @@ from clrt.verify.run import LAST_CASE, catalogue, chosen, context_for, failures,
 
 RAYS = 12_000  #: where the rarest naive failures still show
 CASES = catalogue()
+SLOW = {34, 35, 50, 57, 58}  #: many programs to compile
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +29,9 @@ def context() -> Context:
     return context_for(rays=RAYS)
 
 
-@pytest.mark.parametrize("hard", CASES, ids=lambda c: f"{c.number}")
+@pytest.mark.parametrize(
+    "hard", [pytest.param(c, id=str(c.number), marks=[pytest.mark.slow] if c.number in SLOW else []) for c in CASES]
+)
 def test_case_keeps_promises_and_bites(hard: Case, context: Context) -> None:
     result = run_case(hard, context)
     assert not result.failures(context.rungs)

@@ -78,7 +78,7 @@ class Context:
         return np.random.default_rng((self.seed, number))
 
     def caster(self, key: Hashable, mesh: Any, rung: str, tree: str = "sah") -> RayCaster:
-        """A RayCaster, kept under (key, rung, tree): the key must name the mesh. Raises what RayCaster raises."""
+        """A RayCaster, kept under (key, rung, tree) for the time of a case: the key must name the mesh. Raises what RayCaster raises."""
         from clrt.rays import RayCaster
 
         place = (key, rung, tree)

@@ -49,6 +49,8 @@ def run_case(case: Case, context: Context) -> Result:
         outcome, error = case.run(context), ""
     except Exception as failure:  # any fault at all is this case's, not the end of the others
         outcome, error = None, f"{type(failure).__name__}: {failure}"
+    finally:
+        context.forget()  # each caster holds buffers for all of a case's rays
     return Result(case, outcome, time.perf_counter() - start, error)
 
 
