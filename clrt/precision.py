@@ -11,12 +11,17 @@ from clrt.errors import ClrtError
 
 @dataclass(frozen=True)
 class Precision:
-    """One rung. `real`: the number type of lanes; `kernels`: the files that decide a triangle; `promise`: in a sentence."""
+    """One rung.
+
+    real : the number type of lanes; kernels : the files that decide a triangle; promise : in a sentence
+    surface_kernels : files of its own for what follows a hit
+    """
 
     name: str
     real: type[np.floating]
     kernels: tuple[str, ...]
     promise: str
+    surface_kernels: tuple[str, ...] = ()
 
     @property
     def decides_in_stages(self) -> bool:
@@ -37,7 +42,13 @@ RUNGS = {
     for rung in (
         Precision("fast", np.float32, ("triangle_fast.cl",), "float32, no promise at edges"),
         Precision("watertight", np.float32, ("triangle_watertight.cl",), "no ray passes between triangles that share an edge or a vertex"),
-        Precision("exact", np.float32, ("expansion.cl", "exact.cl", "triangle_exact.cl"), "the visible primitive of exact arithmetic"),
+        Precision(
+            "exact",
+            np.float32,
+            ("expansion.cl", "exact.cl", "triangle_exact.cl"),
+            "the visible primitive of exact arithmetic",
+            ("surface_exact.cl",),
+        ),
         Precision("double", np.float64, ("triangle_watertight.cl",), "float64 throughout, and watertight"),
     )
 }

@@ -5,7 +5,7 @@
 typedef struct {
     real_n origin[3], direction[3], weight;
     mask_n skip, active;
-    int depth_left;
+    int depth_left, from_eye;  // whether the ray's origin is the eye
     //@ bounce_members
 } Bounce;
 
@@ -15,21 +15,25 @@ typedef struct {
 } BounceStack;
 
 // Puts `direction` from the hit point on the stack for the lanes in `active`, starting on the side that it points to; gives its place there.
-HOT Bounce *bounce_push(BounceStack *stack, const Hit *hit, const real_n *direction, real_n weight, mask_n active, const Bounce *from) {
+HOT Bounce *bounce_push(const Geometry *geometry, const Rays *rays, BounceStack *stack, const Hit *hit, const real_n *direction,
+                        real_n weight, mask_n active, const Bounce *from) {
     Bounce *next = stack->entry + stack->count;
     if (!any_lane(active)) return next;
     stack->count++;
     *next = *from;
     real_n away[3] = {hit->geometric[0], hit->geometric[1], hit->geometric[2]};
+    real_n start[3] = {hit->point[0], hit->point[1], hit->point[2]}, error = hit->error;
+    //@ bounce_start
     face_towards(away, direction, 0);
     for (int a = 0; a < 3; a++) {
-        next->origin[a] = choose(active, multiply_add(away[a], hit->error, hit->point[a]), (real_n)0);
+        next->origin[a] = choose(active, multiply_add(away[a], error, start[a]), (real_n)0);
         next->direction[a] = choose(active, direction[a], (real_n)1);
     }
     next->weight = weight;
     next->skip = load_lanes(hit->slot);
     next->active = active;
     next->depth_left = from->depth_left - 1;
+    next->from_eye = 0;
     return next;
 }
 
@@ -63,11 +67,12 @@ HOT void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
     Bounce current;
     bounces.count = 0;
     current.depth_left = frame->depth;
+    current.from_eye = 1;
     //@ bounce_begin
 //@end
 //@hook trace
         // The eye's rays share their origin; those that go on do not.
-        if (current.depth_left == frame->depth) scene_trace(&geometry, &rays, 1, 0, &hits);
+        if (current.from_eye) scene_trace(&geometry, &rays, 1, 0, &hits);
         else scene_trace(&geometry, &rays, 0, 0, &hits);
 //@end
 //@hook spawn
@@ -76,7 +81,7 @@ HOT void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
             //@ bounce_weights
             real_n direction[3];
             bounce_reflected(&rays, &hit, direction);
-            bounce_push(&bounces, &hit, direction, weight * reflected, is_greater(weight * reflected, (real_n)0), &current);
+            bounce_push(&geometry, &rays, &bounces, &hit, direction, weight * reflected, is_greater(weight * reflected, (real_n)0), &current);
         }
 //@end
 //@hook next

@@ -17,7 +17,8 @@ HOT void sphere_trace(const Geometry *geometry, const Rays *rays, const int any_
         const real_n b = -dot_n(f, rays->direction);
         for (int a = 0; a < 3; a++) nearest[a] = multiply_add(rays->direction[a], b, f[a]);
         const real_n discriminant = sphere->radius * sphere->radius - dot_n(nearest, nearest);
-        const mask_n meets = rays->active & is_at_least(discriminant, (real_n)0);
+        // A ray that starts on the sphere meets it whatever the rounding of its discriminant says.
+        const mask_n meets = rays->active & (is_at_least(discriminant, (real_n)0) | (any_hit ? NO_LANES : own));
         if (!any_lane(meets)) continue;
         const real_n root = sqrt(max_n(discriminant, (real_n)0)), length = sqrt(dot_n(f, f));
         const real_n product = (length - sphere->radius) * (length + sphere->radius);

@@ -6,8 +6,9 @@ and 5, newer Xeons) and answers "generic", which its own front end then refuses:
 here, where PoCL keeps it: in the device's record. The new name is the oldest processor that has the instructions
 PoCL's own kernel library was chosen by.
 
-Nothing is written unless the record holds exactly one pointer to the text "generic"; memory is read through
-/proc/self/mem, which refuses bad addresses instead of faulting.
+Nothing is written unless the record holds a pointer to the text "generic". PoCL zeroes a record before it fills it, so the first
+such pointer is the record's own; one behind it may be left over from other memory. Memory is read through /proc/self/mem, which
+refuses bad addresses instead of faulting.
 """
 
 from __future__ import annotations
@@ -79,7 +80,7 @@ def name_processor(handle: Any) -> str | None:
         slots = _slots_of_unknown(handle.int_ptr)
     except OSError:
         slots = []
-    if len(slots) != 1:
+    if not slots:
         if _names:
             return None  # named before in this process
         raise DeviceError(

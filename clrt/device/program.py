@@ -81,12 +81,14 @@ def kernel_source(name: str) -> tuple[str, tuple[tuple[str, str, int], ...]]:
     return _HOOK.sub("", text).rstrip("\n") + "\n", hooks
 
 
-def _structs(features: Features, precision: Precision) -> str:
+def _structs(features: Features, precision: Precision, entry: str) -> str:
     real = precision.real
     names = [("Triangle", layout.triangle(real)), ("EdgePlanes", layout.edge_planes(real)), ("Object", layout.object_record(real)),
              ("Surface", layout.surface(real)), ("Material", material_dtype(features, precision)), ("Frame", frame_dtype(features, precision))]  # fmt: skip
     declared = " ".join(declaration for f in features.active for _, declaration in f.parameters)
     names += [(name, make(real)) for name, make in (("Light", layout.light), ("Sphere", layout.sphere)) if f" {name} " in declared]
+    if entry == "cast":
+        names += [("GivenRay", layout.GIVEN_RAY), ("HitSource", layout.HIT_SOURCE), ("HitRecord", layout.HIT_RECORD)]
     return "".join(layout.c_struct(name, dtype) for name, dtype in names)
 
 
@@ -136,6 +138,7 @@ def _insert(name: str, text: str, hooks: dict[str, list[tuple[str, str, int]]]) 
 def _files(features: Features, precision: Precision, entry: str) -> Iterator[str]:
     before, between, after = _ENTRIES[entry]
     yield from (*_RAYS, *precision.kernels, *_TREES, *before)
+    yield from precision.surface_kernels if "hit.cl" in before else ()
     yield from (f.kernel for f in features.active if f.early)
     yield from between
     yield from (f.kernel for f in features.active if not f.early)
@@ -158,7 +161,7 @@ def compose(features: Features, precision: Precision, lanes: int, shape: Shape, 
         for place, code, line in kernel_source(name)[1]:
             hooks.setdefault(place, []).append((name, code, line))
     chunks = [_defines(features, precision, lanes, shape, counting), f'#line 1 "lanes.cl"\n{kernel_source("lanes.cl")[0]}']
-    chunks.append(f'#line 1 "structs"\n{_structs(features, precision)}')
+    chunks.append(f'#line 1 "structs"\n{_structs(features, precision, entry)}')
     for name in files:
         chunks.append(f'#line 1 "{name}"\n' + _insert(name, kernel_source(name)[0], hooks))
     return _COUNTING.sub(r"\1\2\n" if counting else "\n", "".join(chunks))

@@ -1,0 +1,49 @@
+// Provides: refine_points: where rays of the rung `exact` start from, better than `real` can compute it.
+// Needs: exact.cl, hit.cl.  Reads: nothing.
+
+// The points where rays meet triangles again, in float64 from the numbers as given: rounded once, they lie off the surface by u |P|
+// a coordinate, as much again for the offset, and the float64 error; which is what `error` becomes. Spheres keep theirs.
+static __attribute__((noinline)) void refine_points(const Geometry *geometry, const Rays *rays, const int shared_origin, const Hit *hit,
+                                                    mask_n active, real_n *point, real_n *error) {
+    lane_int lane[LANES];
+    real p[3][LANES], n[3][LANES], e[LANES];
+    store_lanes(active, lane);
+    store_lanes(*error, e);
+    for (int a = 0; a < 3; a++) {
+        store_lanes(point[a], p[a]);
+        store_lanes(hit->geometric[a], n[a]);
+    }
+    for (int k = 0; k < LANES; k++) {
+        if (!lane[k] || hit->slot[k] >= geometry->slot_count) continue;
+        double origin[3], direction[3], t_min, t_max, e1[3], e2[3], normal[3], sum = 0;
+        ray_given(geometry, rays, k, shared_origin, origin, direction, &t_min, &t_max);
+        global const double *v = geometry->vertices + 9 * (size_t)hit->slot[k];
+        Plane plane;
+        plane_double(geometry, origin, direction, (int)hit->slot[k], &plane);
+        const double t = plane.offset / plane.rate;
+        for (int a = 0; a < 3; a++) {
+            e1[a] = v[3 + a] - v[a];
+            e2[a] = v[6 + a] - v[a];
+            const double exact = origin[a] - geometry->local_origin[a] + t * direction[a];
+            p[a][k] = (real)exact;
+            sum += fabs(exact * n[a][k]);
+        }
+        cross_double(e1, e2, normal);
+        const double rest = (plane.offset_error + fabs(t) * plane.rate_error) / sqrt(dot_double(normal, normal));
+        e[k] = (real)(2 * UNIT_ROUNDOFF * sum + 2 * rest);
+    }
+    for (int a = 0; a < 3; a++) point[a] = load_lanes(p[a]);
+    *error = load_lanes(e);
+}
+
+//@hook hit_distance
+    t = choose(hit->found & is_less(hits->slot, (mask_n)geometry->slot_count), R(0.5) * (hits->t + hits->low), t);
+//@end
+//@hook bounce_start
+    const Geometry seen = *geometry;
+    const Rays copy = *rays;
+    real_n refined[3] = {start[0], start[1], start[2]}, refined_error = error;
+    refine_points(&seen, &copy, from->from_eye, hit, active, refined, &refined_error);
+    for (int a = 0; a < 3; a++) start[a] = refined[a];
+    error = refined_error;
+//@end
