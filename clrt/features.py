@@ -68,8 +68,8 @@ def _light_caller(scene: Scene) -> int | None:
 
 
 def _shadow_caller(scene: Scene) -> int | None:
-    """A light, and something that can stand in its way: a lone triangle cannot shadow itself, a sphere can from inside."""
-    return _light_caller(scene) if scene.triangle_count > 1 or len(scene.spheres) else None
+    """A light, and something that can stand in its way: a lone flat triangle cannot shadow itself, a curved one and a sphere can."""
+    return _light_caller(scene) if scene.triangle_count > 1 or len(scene.spheres) or _smooth_caller(scene) is not None else None
 
 
 def _bounce_caller(scene: Scene) -> int | None:
@@ -91,7 +91,9 @@ FEATURES: tuple[Feature, ...] = (
         parameters=(("spheres", "global const Sphere *spheres"),),
     ),
     Feature("smooth", _smooth_caller, "smooth.cl", early=True, parameters=(("corner_normals", "global const real *corner_normals"),)),
-    Feature("shadows", _shadow_caller, "shadow.cl", parameters=(("light_planes", "global const EdgePlanes *light_planes"),), rays=("shadow",)),
+    Feature(
+        "shadows", _shadow_caller, "shadow.cl", parameters=(("light_planes", "global const EdgePlanes *light_planes"),), rays=("shadow",)
+    ),
     Feature(
         "direct light",
         _light_caller,
@@ -104,6 +106,7 @@ FEATURES: tuple[Feature, ...] = (
         _material_caller("refract"),
         "refraction.cl",
         material=(("refract", REAL), ("ior", REAL)),
+        parameters=(("media", "global const int *media"),),
         rays=("refracted", "internal"),
     ),
     Feature("mirror", _material_caller("reflect"), "mirror.cl", material=(("reflect", REAL),), rays=("mirror",)),

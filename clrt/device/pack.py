@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.device import layout
-from clrt.device.program import frame_dtype, material_dtype
+from clrt.device.program import MEDIA_DEPTH, frame_dtype, material_dtype
 from clrt.features import Features
 from clrt.kdtree.tree import LEAF, KdTree
 from clrt.precision import Precision
+from clrt.scene.media import around_eye, ranks, refracting_materials
 from clrt.scene.model import MeshObject, Scene
 
 FloatArray = NDArray[np.float64]
@@ -218,4 +219,16 @@ def _corner_normals(packed: Packed) -> NDArray[Any]:
     return np.concatenate(parts)
 
 
-_PACKERS: dict[str, Callable[[Packed], NDArray[Any]]] = {"lights": _lights, "spheres": _spheres, "corner_normals": _corner_normals}
+def _media(packed: Packed) -> NDArray[np.int32]:
+    """What refraction.cl asks of objects: see there. Of objects around the eye the highest ranks are kept."""
+    scene, rank, material = packed.scene, ranks(packed.scene), refracting_materials(packed.scene)
+    around = around_eye(scene)[-MEDIA_DEPTH:]
+    pairs = np.zeros((MEDIA_DEPTH, 2), np.int32)
+    pairs[: len(around)] = [(i, material[i]) for i in around] or np.zeros((0, 2))
+    meshes = np.count_nonzero(rank[: len(scene.objects)] >= 0)
+    return np.concatenate([[meshes, len(around)], pairs.ravel(), rank]).astype(np.int32)
+
+
+_PACKERS: dict[str, Callable[[Packed], NDArray[Any]]] = {
+    "lights": _lights, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media,
+}  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,44 +15,63 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+Walls = Sequence[tuple[IndexArray, IndexArray]]
+
 STACK_SIZE = 8  #: dielectrics a ray can be inside of at once
 
 
 @dataclass(frozen=True, eq=False)
 class MediumStack:
-    """For m rays: object (m, 8) ids of the dielectrics entered, ior (m, 8) their indices, count (m,) entries in use, oldest first."""
+    """For m rays: object (m, 8) ids of the dielectrics entered, ior (m, 8) their indices, rank (m, 8), count (m,) entries in use, oldest first."""
 
     object: IndexArray
     ior: FloatArray
+    rank: IndexArray
     count: IndexArray
 
     @classmethod
     def outside(cls, m: int) -> MediumStack:
-        return cls(np.full((m, STACK_SIZE), -1, np.int64), np.ones((m, STACK_SIZE)), np.zeros(m, np.int64))
+        return cls(np.full((m, STACK_SIZE), -1, np.int64), np.ones((m, STACK_SIZE)), np.full((m, STACK_SIZE), -1, np.int64), np.zeros(m, np.int64))
 
     def __getitem__(self, rows: IndexArray) -> MediumStack:
-        return MediumStack(self.object[rows], self.ior[rows], self.count[rows])
+        return MediumStack(self.object[rows], self.ior[rows], self.rank[rows], self.count[rows])
 
     @property
     def index(self) -> FloatArray:
-        """(m,) refractive index of the medium around each ray: that of the newest entry, 1 outside of all."""
-        top = np.take_along_axis(self.ior, np.maximum(self.count - 1, 0)[:, None], axis=1)[:, 0]
+        """(m,) refractive index of the medium around each ray: that of the entry of the highest rank, 1 outside of all."""
+        rank = np.where(self._used, self.rank, -1)
+        top = np.take_along_axis(self.ior, rank.argmax(axis=1)[:, None], axis=1)[:, 0]
         return np.where(self.count > 0, top, 1.0)
 
-    def crossed(self, object_id: IndexArray, ior: FloatArray) -> MediumStack:
-        """Behind the surfaces of `object_id` (m,): an object on the stack is left, any other entered with index `ior` (m,).
+    @property
+    def _used(self) -> BoolArray:
+        used: BoolArray = np.arange(STACK_SIZE) < self.count[:, None]
+        return used
 
-        A ninth object replaces the newest entry.
+    def crossed(self, object_id: IndexArray, ior: FloatArray, rank: IndexArray | None = None) -> MediumStack:
+        """Behind the surfaces of `object_id` (m,): an object on the stack is left, any other entered with index `ior` and `rank` (m,).
+
+        Without ranks the newest has the highest. A ninth object replaces the newest entry.
         """
         place = np.arange(STACK_SIZE)
-        held = (self.object == object_id[:, None]) & (place < self.count[:, None])
+        held = (self.object == object_id[:, None]) & self._used
         leaving = held.any(axis=1)
+        if rank is None:
+            rank = np.where(self._used, self.rank, -1).max(axis=1) + 1
         # Leaving: the entries above move down by one.
         source = np.minimum(place + (leaving[:, None] & (place >= held.argmax(axis=1)[:, None])), STACK_SIZE - 1)
-        ids, iors = np.take_along_axis(self.object, source, axis=1), np.take_along_axis(self.ior, source, axis=1)
+        ids, iors, ranks = (np.take_along_axis(a, source, axis=1) for a in (self.object, self.ior, self.rank))
         new = ~leaving[:, None] & (place == np.minimum(self.count, STACK_SIZE - 1)[:, None])
         count = np.where(leaving, self.count - 1, np.minimum(self.count + 1, STACK_SIZE))
-        return MediumStack(np.where(new, object_id[:, None], ids), np.where(new, ior[:, None], iors), count)
+        return MediumStack(*(np.where(new, a[:, None], b) for a, b in ((object_id, ids), (ior, iors), (rank, ranks))), count)
+
+    def crossed_at(self, rows: IndexArray, object_id: IndexArray, ior: FloatArray, rank: IndexArray) -> MediumStack:
+        """As `crossed`, for these rows alone."""
+        columns = [a.copy() for a in (self.object, self.ior, self.rank, self.count)]
+        behind = self[rows].crossed(object_id, ior, rank)
+        for column, part in zip(columns, (behind.object, behind.ior, behind.rank, behind.count), strict=True):
+            column[rows] = part
+        return MediumStack(*columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,10 +92,19 @@ class Bounces:
     margin: FloatArray
 
 
-def bounces(prims: Primitives, materials: MaterialTable, surface: Surface, stack: MediumStack) -> Bounces:
-    """Snell's law against the medium around the ray; under total reflection the weight Refract goes to the reflected ray."""
+def bounces(
+    prims: Primitives, materials: MaterialTable, surface: Surface, stack: MediumStack, rank: IndexArray, walls: Walls = ()
+) -> Bounces:
+    """Snell's law against the medium around the ray; under total reflection the weight Refract goes to the reflected ray.
+
+    rank : of every object, see media.ranks; walls : those that coincide with the surface, see media.walls
+    """
     ids = surface.material
-    behind = stack.crossed(prims.object_id[surface.prim], materials.ior[ids])
+    object_id = prims.object_id[surface.prim]
+    behind = stack.crossed(object_id, materials.ior[ids], rank[object_id])
+    for rows, prim in walls:
+        object_id = prims.object_id[prim]
+        behind = behind.crossed_at(rows, object_id, materials.ior[prims.material[prim]], rank[object_id])
     glass = materials.refract[ids] > 0.0
     ratio = np.divide(stack.index, behind.index, where=glass, out=np.ones(len(ids)))
     refracted, k, flat_margin, stretch = _refract(surface, ratio)

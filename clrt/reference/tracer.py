@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.errors import SceneError
-from clrt.reference.bounce import MediumStack, bounces
+from clrt.reference import media
+from clrt.reference.bounce import STACK_SIZE, MediumStack, Walls, bounces
 from clrt.reference.crossings import BAND, Rays
 from clrt.reference.geometry import MaterialTable, Primitives
 from clrt.reference.lines import TILE_BYTES
@@ -59,7 +60,28 @@ class _World:
     scene: Scene
     prims: Primitives
     materials: MaterialTable
+    rank: IndexArray
     tile_bytes: int
+
+    @classmethod
+    def of(cls, scene: Scene, tile_bytes: int) -> _World:
+        prims, materials = Primitives.build(scene), MaterialTable.build(scene)
+        return cls(scene, prims, materials, media.ranks(prims, materials), tile_bytes)
+
+    @property
+    def walls_may_coincide(self) -> bool:
+        """Whether there are several meshes of glass."""
+        return int(np.count_nonzero(self.rank[: len(self.scene.objects)] >= 0)) > 1
+
+    def first_media(self) -> MediumStack:
+        """The media around the eye, as of one ray."""
+        stack, one = MediumStack.outside(1), np.ones(1, np.int64)
+        if not (self.rank >= 0).any():
+            return stack
+        for k in media.around(self.prims, self.rank, np.asarray(self.scene.camera.eye, np.float64), self.tile_bytes)[-STACK_SIZE:]:
+            material = self.prims.material[(self.prims.object_id == k) & (self.materials.refract[self.prims.material] > 0.0)].min()
+            stack = stack.crossed(k * one, self.materials.ior[[material]], self.rank[[k]])
+        return stack
 
 
 def render(scene: Scene, *, directions: FloatArray | None = None, chunk_bytes: int = TILE_BYTES) -> ReferencePicture:
@@ -76,14 +98,15 @@ def render(scene: Scene, *, directions: FloatArray | None = None, chunk_bytes: i
         raise SceneError(f"directions have the shape {d.shape}; a picture of {width} x {height} takes {(height, width, 3)}")
     if not np.isfinite(d).all() or not d.any(axis=2).all():
         raise SceneError("a direction is zero or not finite; every pixel needs one")
-    world = _World(scene, Primitives.build(scene), MaterialTable.build(scene), chunk_bytes)
+    world = _World.of(scene, chunk_bytes)
+    first = world.first_media()
     picture = ReferencePicture(
         np.zeros((height * width, 3)), np.full(height * width, -1, np.int64), np.full(height * width, np.inf),
         np.full(height * width, np.inf), dict.fromkeys(("primary", "shadow", "reflected", "refracted"), 0),
     )  # fmt: skip
     for start in range(0, height * width, PIXELS_AT_ONCE):
         pixel = np.arange(start, min(start + PIXELS_AT_ONCE, height * width))
-        wave = _primary(scene, d.reshape(-1, 3)[pixel], pixel)
+        wave = _primary(scene, d.reshape(-1, 3)[pixel], pixel, first)
         picture.rays["primary"] += len(pixel)
         for depth in range(scene.depth + 1):
             wave = _trace(world, wave, picture, depth)
@@ -95,11 +118,11 @@ def render(scene: Scene, *, directions: FloatArray | None = None, chunk_bytes: i
                             picture.margin.reshape(shape), picture.rays)  # fmt: skip
 
 
-def _primary(scene: Scene, directions: FloatArray, pixel: IndexArray) -> _Wave:
+def _primary(scene: Scene, directions: FloatArray, pixel: IndexArray, first: MediumStack) -> _Wave:
     m = len(pixel)
     origin = np.broadcast_to(np.asarray(scene.camera.eye, np.float64), (m, 3)).copy()
     rays = Rays(origin, directions, np.full(m, -1, np.int64), np.zeros(m), np.ones(m))
-    return _Wave(rays, np.ones(m), pixel, MediumStack.outside(m))
+    return _Wave(rays, np.ones(m), pixel, first[np.zeros(m, np.int64)])
 
 
 def _trace(world: _World, wave: _Wave, picture: ReferencePicture, depth: int) -> _Wave:
@@ -119,7 +142,7 @@ def _trace(world: _World, wave: _Wave, picture: ReferencePicture, depth: int) ->
     picture.rays["shadow"] += shadow_rays
     np.add.at(picture.pixels, wave.pixel, wave.weight[:, None] * color)
     np.minimum.at(picture.margin, wave.pixel, margin)
-    return _next(world, wave, surface, picture) if depth < world.scene.depth else _select(wave, np.zeros(0, np.int64))
+    return _next(world, wave, surface, t, picture) if depth < world.scene.depth else _select(wave, np.zeros(0, np.int64))
 
 
 def _select(wave: _Wave, rows: IndexArray) -> _Wave:
@@ -127,9 +150,12 @@ def _select(wave: _Wave, rows: IndexArray) -> _Wave:
     return _Wave(rays, wave.weight[rows], wave.pixel[rows], wave.stack[rows])
 
 
-def _next(world: _World, wave: _Wave, surface: Surface, picture: ReferencePicture) -> _Wave:
+def _next(world: _World, wave: _Wave, surface: Surface, t: FloatArray, picture: ReferencePicture) -> _Wave:
     """Reflected rays, then refracted ones, those of weight 0 left out."""
-    b = bounces(world.prims, world.materials, surface, wave.stack)
+    walls: Walls = ()
+    if world.walls_may_coincide:
+        walls = media.walls(world.prims, world.materials, wave.rays, surface.prim, t, world.tile_bytes)
+    b = bounces(world.prims, world.materials, surface, wave.stack, world.rank, walls)
     np.minimum.at(picture.margin, wave.pixel, b.margin)
     up, down = np.flatnonzero(wave.weight * b.reflect_weight), np.flatnonzero(wave.weight * b.refract_weight)
     picture.rays["reflected"] += len(up)
@@ -139,6 +165,6 @@ def _next(world: _World, wave: _Wave, surface: Surface, picture: ReferencePictur
     pos_err, dir_err = np.concatenate([b.reflect_err[:, up], b.refract_err[:, down]], axis=1)
     weight = wave.weight[both] * np.concatenate([b.reflect_weight[up], b.refract_weight[down]])
     above, behind = wave.stack[up], b.behind[down]
-    stack = MediumStack(*(np.concatenate([getattr(above, n), getattr(behind, n)]) for n in ("object", "ior", "count")))
+    stack = MediumStack(*(np.concatenate([getattr(above, n), getattr(behind, n)]) for n in ("object", "ior", "rank", "count")))
     rays = Rays(surface.point[both], direction, surface.prim[both], pos_err, dir_err)
     return _Wave(rays, weight, wave.pixel[both], stack)

@@ -220,7 +220,7 @@ def _glass(index: float) -> str:
 
 @case(46, "glass, water and air inside each other", provokes="the wrong index", oracle="S", promised=ALL)
 def nested(context: Context) -> Outcome:
-    """Boxes inside boxes, in every order of the text: the cards behind them are where Snell's law puts them."""
+    """Boxes inside boxes, in every order of the text, and two that overlap: the cards behind them are where Snell's law puts them."""
     boxes = {1.5: (1.0, 3.0, 40.0), 1.33: (1.2, 2.6, 39.0), 1.0: (1.5, 2.2, 38.0)}
     layers = [(1.0, 1.0), (0.2, 1.5), (0.3, 1.33), (0.7, 1.0), (0.4, 1.33), (0.4, 1.5), (0.2, 1.0)]
     scenes, naive = [], []
@@ -229,6 +229,13 @@ def nested(context: Context) -> Outcome:
         scene = parse_scene(text)
         scenes.append((scene, *_seen(scene, layers, 1.0, 1.0)))
         naive.append(_seen(scene, [(1.2, 1.0), (1.8, 1.5), (0.2, 1.0)], 1.0, 1.0)[0])  # the outermost index alone
+    overlapping = {1.7: (1.0, 2.2, 40.0), 1.3: (1.8, 3.0, 40.0)}
+    for first, second in ((1.7, 1.3), (1.3, 1.7)):  # the second has the say between 1.8 and 2.2
+        text = _view(64, 22.0) + "depth 8\n" + _cards(3.2) + "".join(_glass(index) + _slab(*overlapping[index]) for index in (first, second))
+        scene = parse_scene(text)
+        middle = [(0.8, 1.7), (1.2, 1.3)] if second == 1.3 else [(1.2, 1.7), (0.8, 1.3)]
+        scenes.append((scene, *_seen(scene, [(1.0, 1.0), *middle, (0.2, 1.0)], 1.0, 1.0)))
+        naive.append(_seen(scene, [(1.0, 1.0), (0.8, 1.7), (0.4, 1.0), (0.8, 1.3), (0.2, 1.0)], 1.0, 1.0)[0])  # no media between
     return _judge(context, scenes, naive)
 
 
