@@ -36,7 +36,7 @@ def verify(full: bool, numbers: tuple[int, ...], json_path: str | None, device: 
         check_writable(json_path)
     context = context_for(device, full=full)
     with PhaseProgress(quiet=quiet) as progress:
-        results = run(cases, context, progress)
+        results = run(cases, context, lambda _, done: progress("running the hard cases", done))
     if json_path is not None:
         _write_json(json.dumps(to_json(results, context), indent=2, ensure_ascii=False) + "\n", json_path)
     if not quiet and json_path != "-":

@@ -69,11 +69,12 @@ def against(context: Context, key: Hashable, tri: Triangles, rays: Rays, expecte
 
 
 def leaks(context: Context, key: Hashable, tri: Triangles, rays: Rays) -> dict[str, int | None]:
-    """Rays that start inside a closed mesh and are said to hit nothing, for every rung: no oracle needed, so any number of rays."""
+    """Rays that start inside a closed mesh and are said to hit nothing, as their first hit or any: no oracle needed, so any number."""
 
     def count(rung: str) -> int:
-        hits = context.caster(key, tri, rung).first_hit(rays.origins, rays.directions)
-        return int(np.count_nonzero((hits["prim_id"] < 0) | unusable(hits)))
+        caster = context.caster(key, tri, rung)
+        hits, blocked = caster.first_hit(rays.origins, rays.directions), caster.any_hit(rays.origins, rays.directions)
+        return int(np.count_nonzero((hits["prim_id"] < 0) | ~blocked | unusable(hits)))
 
     return context.each_rung(count)
 
