@@ -31,6 +31,7 @@ def results() -> dict[str, Any]:
             },
             "cores_used": {"clrt without lights": 1.98, "embreex primary": 1.95}, "pixels_that_differ": {"hit": 0, "lit": 7},
         },
+        "ladder": [ladder_row("fast", 1.0), ladder_row("watertight", 1.03), ladder_row("exact", 1.08), ladder_row("double", 2.1)],
         "tests": [tests_row("rabbit", "sah", 23_476, 20, 20.9), tests_row("rabbit", "median", 8_482, 15, 164.5),
                   tests_row("monkey", "sah", 288, 13, 15.6), tests_row("monkey", "median", 258, 10, 53.1)],
         "command": {"scene": "rabbit", "size": 512, "seconds": series(0.8), "phases": {"read_s": 0.1, "total_s": 0.7}},
@@ -45,6 +46,14 @@ def tree_row(size: int, sample: dict[str, Any] | None) -> dict[str, Any]:
         "scene": "rabbit", "size": size, "tree": "sah", "triangles": 69_453, "nodes": 23_476, "depth": 20, "tests_per_ray": 20.94,
         "rays": 4000, "render_s": series(0.0149), "sample": sample, "brute_s": series(1.5), "brute_picture_s": 6.0, "speed_up": 402.7,
         "speed_up_same_rays": 9.876, "build_s": series(0.25), "brute_tests_per_ray": 50_638.2,
+    }  # fmt: skip
+
+
+def ladder_row(rung: str, ratio: float) -> dict[str, Any]:
+    return {
+        "scene": "rabbit", "effects": "shadows alone", "size": 1024, "rung": rung, "render_s": series(0.03 * ratio), "ratio": ratio,
+        "ratio_median": ratio, "ratio_range": [ratio * 0.9, ratio * 1.1],
+        "decided": {"float64": 5, "exact": 1} if rung == "exact" else None,
     }  # fmt: skip
 
 

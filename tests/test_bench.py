@@ -68,7 +68,7 @@ def verdicts(results: dict[str, Any]) -> dict[str, bool | None]:
 
 
 def test_marks_that_are_kept_pass() -> None:
-    assert len(verdicts(bench_results.results())) == 9
+    assert len(verdicts(bench_results.results())) == 12
     assert set(verdicts(bench_results.results()).values()) == {True}
 
 
@@ -96,7 +96,7 @@ def test_marks_have_no_verdict_where_other_scenes_or_no_peer_were_measured() -> 
     results = bench_results.results()
     results["scenes"][1] |= {"name": "rabbit-like (generated)", "generated": True}
     found = verdicts(results)
-    assert [passed for what, passed in found.items() if "rabbit" in what] == [None] * 6
+    assert [passed for what, passed in found.items() if "rabbit" in what] == [None] * 9
     assert [passed for what, passed in found.items() if "monkey" in what] == [True] * 2
     results = bench_results.results() | {"quick": True}
     assert sorted(map(str, set(verdicts(results).values()))) == ["None", "True"]
@@ -125,7 +125,7 @@ def test_markdown_has_every_row_once() -> None:
     )
     everything = report.markdown(results, report.tables(results), level=3)
     rows = [line for line in everything.splitlines() if line.startswith("| ")]
-    assert len(rows) == 2 * 6 + sum(len(table.rows) for table in report.tables(results)) == 12 + 1 + 2 + 3 + 4 + 1 + 1
+    assert len(rows) == 2 * 7 + sum(len(table.rows) for table in report.tables(results)) == 14 + 1 + 2 + 3 + 4 + 4 + 1 + 1
     assert "| both, and shading | 1,500 | 1,501 | 50.0 | 22.0 | 2.27 |" in rows
 
 
@@ -139,16 +139,20 @@ def test_a_busy_machine_is_told() -> None:
 def checkout(root: Path) -> tuple[Path, Path]:
     page, readme = root / "docs" / "performance.md", root / "README.md"
     page.parent.mkdir()
-    for path in (page, readme):
+    for path in (page, readme, _numerics(root)):
         path.write_text(f"before\n\n{export.BEGIN}\nold\n{export.END}\n\nafter\n")
     return page, readme
+
+
+def _numerics(root: Path) -> Path:
+    return root / "docs" / "numerics.md"
 
 
 def test_documents_are_filled_between_their_marks_alone(tmp_path: Path) -> None:
     page, readme = checkout(tmp_path)
     export.write_docs(bench_results.results(), tmp_path)
     once = page.read_text(), readme.read_text()
-    assert export.write_docs(bench_results.results(), tmp_path) == [page, readme]
+    assert export.write_docs(bench_results.results(), tmp_path) == [page, readme, _numerics(tmp_path)]
     assert (page.read_text(), readme.read_text()) == once
     for text in once:
         assert text.startswith(f"before\n\n{export.BEGIN}\nMeasured 2031-02-03")
@@ -159,6 +163,7 @@ def test_documents_are_filled_between_their_marks_alone(tmp_path: Path) -> None:
     assert "| 256² |" in once[0]
     assert "| 256² |" not in once[1]
     assert "about 402.7" in once[1]
+    assert "| watertight | 1024² |" in _numerics(tmp_path).read_text()
 
 
 def test_documents_without_marks_or_for_a_quick_run_are_left_alone(tmp_path: Path) -> None:
@@ -221,7 +226,7 @@ def test_quick_run_measures_everything(tmp_path: Path) -> None:
     (path,) = tmp_path.iterdir()
     results = json.loads(path.read_text())
     assert set(results) == {
-        "started", "finished", "quick", "machine", "load_before", "load_after", "plan", "scenes", "trees", "versus", "tests", "command",
+        "started", "finished", "quick", "machine", "load_before", "load_after", "plan", "scenes", "trees", "versus", "ladder", "tests", "command",
         "programs", "marks",
     }  # fmt: skip
     assert {"cpu", "cores", "memory_gib", "os", "python", "opencl_platform", "opencl_driver", "packages"} <= set(results["machine"])

@@ -7,13 +7,13 @@ import re
 from pathlib import Path
 from typing import Any
 
-from clrt.bench.report import markdown, tables, trees_table, versus_table
+from clrt.bench.report import ladder_table, markdown, tables, trees_table, versus_table
 from clrt.errors import ClrtError
 from clrt.files import atomic_write, check_writable
 
 BEGIN, END = "<!-- bench:begin -->", "<!-- bench:end -->"
 _PLACE = re.compile(rf"{re.escape(BEGIN)}\n.*?{re.escape(END)}", re.S)
-_KEYS = ("started", "quick", "machine", "scenes", "trees", "versus", "tests", "command", "programs", "marks")
+_KEYS = ("started", "quick", "machine", "scenes", "trees", "versus", "ladder", "tests", "command", "programs", "marks")
 
 
 def save(results: dict[str, Any], folder: Path) -> Path:
@@ -50,22 +50,23 @@ def check_docs(root: Path) -> None:
 
 
 def write_docs(results: dict[str, Any], root: Path) -> list[Path]:
-    """Put all tables into docs/performance.md and the main ones into README.md; returns both. Raises as `check_docs`."""
+    """Put all tables into docs/performance.md, the main ones into README.md, the ladder into docs/numerics.md; returns these. Raises as `check_docs`."""
     if results["quick"]:
         raise ClrtError("a quick run is not for the documentation; leave out --quick")
     check_docs(root)
-    page, readme = _documents(root)
+    page, readme, numerics = _documents(root)
     largest = max(row["size"] for row in results["trees"])
     main = [
         trees_table([row for row in results["trees"] if row["size"] == largest]),
         versus_table(results["versus"], results["machine"]["cores"]),
     ]
-    for path, text in ((page, markdown(results, tables(results), level=3)), (readme, markdown(results, main, level=3))):
+    chosen = ((page, tables(results)), (readme, main), (numerics, [ladder_table(results["ladder"])]))
+    for path, text in ((path, markdown(results, each, level=3)) for path, each in chosen):
         before, _, after = path.read_text(encoding="utf-8").partition(BEGIN)
         with atomic_write(path) as file:
             file.write(f"{before}{BEGIN}\n{text}\n{END}{after.partition(END)[2]}".encode())
-    return [page, readme]
+    return [page, readme, numerics]
 
 
-def _documents(root: Path) -> tuple[Path, Path]:
-    return root / "docs" / "performance.md", root / "README.md"
+def _documents(root: Path) -> tuple[Path, Path, Path]:
+    return root / "docs" / "performance.md", root / "README.md", root / "docs" / "numerics.md"

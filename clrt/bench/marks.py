@@ -9,6 +9,7 @@ from typing import Any
 _TIMES_EMBREEX = 2.0
 _TESTS_PER_RAY = {"rabbit": 40.0, "monkey": 30.0}
 _COMMAND_S = 2.0
+_TIMES_FAST = {"watertight": 1.10, "exact": 1.20, "double": 2.6}
 #: depth and nodes of the report's trees; its splitter leaves open what a corner in the plane is, so ours need only be near
 _REPORT_TREES = {"monkey": (9, 138), "rabbit": (17, 18_094)}
 _DEPTH_SLACK, _NODES_FACTOR = 3, 2.5
@@ -35,6 +36,7 @@ def marks_of(results: dict[str, Any]) -> list[Mark]:
     marks = list(_versus(results, reason or generated.get("rabbit", "")))
     for row in results["tests"]:
         marks += _tests(row, reason or generated.get(row["role"], ""))
+    marks += _ladder(results, reason or generated.get("rabbit", ""))
     command = results["command"]
     marks.append(_mark(
         f"whole command, {command['scene']}, {command['size']} squared, after a first run", f"under {_COMMAND_S:.1f} s",
@@ -61,6 +63,14 @@ def _versus(results: dict[str, Any], reason: str) -> Iterator[Mark]:
         else:
             rate = versus["rates"]["clrt"][kind]
             yield Mark(what, target, f"{rate:.1f} million a second", None, "no verdict: embreex is not installed")
+
+
+def _ladder(results: dict[str, Any], reason: str) -> Iterator[Mark]:
+    for row in results["ladder"]:
+        if row["effects"] == "shadows alone" and row["rung"] in _TIMES_FAST:
+            limit, ratio = _TIMES_FAST[row["rung"]], row["ratio_median"]
+            what = f"{row['rung']} over fast, {row['scene']}, {row['size']} squared, shadows alone"
+            yield _mark(what, f"at most {limit:.2f} times", f"{ratio:.3f} times", ratio <= limit, reason)
 
 
 def _tests(row: dict[str, Any], reason: str) -> Iterator[Mark]:

@@ -34,6 +34,7 @@ class Plan:
     brute_limit : pixels times triangles beyond which it takes too long
     brute_count_size : of the picture that its tests are counted in, at most; the counters of a launch have 32 bits
     versus_size, count_size, command_size : of the other measurements
+    ladder_rounds : of the rungs' pictures, whose times lie so near each other that they want more
     """
 
     rounds: int = 5
@@ -44,11 +45,13 @@ class Plan:
     versus_size: int = 1024
     count_size: int = 1024
     command_size: int = 512
+    ladder_rounds: int = 15
 
 
 FULL = Plan()
 QUICK = Plan(
-    rounds=2, sizes=(32,), sample=16, brute_limit=500_000, brute_count_size=16, versus_size=64, count_size=64, command_size=64
+    rounds=2, sizes=(32,), sample=16, brute_limit=500_000, brute_count_size=16, versus_size=64, count_size=64, command_size=64,
+    ladder_rounds=2,
 )  # fmt: skip
 
 

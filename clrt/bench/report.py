@@ -30,7 +30,7 @@ def tables(results: dict[str, Any]) -> list[Table]:
     """All tables of a run, the marks first."""
     return [
         marks_table(results["marks"]), trees_table(results["trees"]), versus_table(results["versus"], results["machine"]["cores"]),
-        tests_table(results["tests"]), command_table(results["command"]), programs_table(results["programs"]),
+        ladder_table(results["ladder"]), tests_table(results["tests"]), command_table(results["command"]), programs_table(results["programs"]),
     ]  # fmt: skip
 
 
@@ -97,6 +97,21 @@ def _versus_note(versus: dict[str, Any], cores: int) -> str:
         f"Cores in use, of {cores}: clrt {ours:.2f}, embreex {theirs:.2f}. "
         f"Pixels where only one hits anything: {differ['hit']:,}; where only one sees the light: {differ['lit']:,}."
     )
+
+
+def ladder_table(rows: list[dict[str, Any]]) -> Table:
+    """What each rung costs over `fast`."""
+    cells = []
+    for row in rows:
+        low, high = row["ratio_range"]
+        decided = row["decided"] or {}
+        cells.append([
+            row["scene"], row["effects"], row["rung"], f"{row['size']}²", seconds(row["render_s"]["best"]), f"{row['ratio']:.3f}",
+            f"{row['ratio_median']:.3f} ({low:.2f} to {high:.2f})", *(f"{decided[s]:,}" if decided else "-" for s in ("float64", "exact")),
+        ])  # fmt: skip
+    headings = ["scene", "with", "rung", "size", "best", "ratio of bests", "ratio by rounds, median", "lanes to float64", "to expansions"]
+    note = "Launches in turns; a round's ratio is its time over that of `fast` in the same round."
+    return Table("The precision ladder", headings, cells, words=3, note=note)
 
 
 def tests_table(rows: list[dict[str, Any]]) -> Table:
