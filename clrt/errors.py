@@ -3,6 +3,7 @@
     ClrtError             whatever the user can mend; one clear message (command line: exit code 2)
     +-- SceneError        a scene text or a scene that cannot be rendered
     +-- MeshError         a file or an array of triangles that cannot be used
+    +-- RayError          arrays of rays that cannot be used; also a ValueError
     +-- DeviceError       no OpenCL platform, no such device, a device that lacks what is asked for
     +-- LimitError        a size beyond what memory or the device's stack allows; said before it is taken
 
@@ -22,6 +23,10 @@ class SceneError(ClrtError):
 
 class MeshError(ClrtError):
     """Triangles that are refused: an unreadable file, no faces, indices out of range, NaN in the vertices."""
+
+
+class RayError(ClrtError, ValueError):
+    """Arrays of rays that are refused: a shape or a number type that does not fit. The message names the argument."""
 
 
 class DeviceError(ClrtError):

@@ -1,14 +1,40 @@
-// Provides: kernels cast (arrays of rays: first, any, or next hit) and cast_finish (t, u, v of the hits).
-// Needs: scene.cl, triangle.cl.  Reads: nothing.
+// Provides: kernels cast (arrays of rays: first, any, or all hits) and cast_finish (the records of first hits).
+// Needs: scene.cl, triangle.cl, structs.  Reads: nothing.
 //
-// A ray is 8 doubles: origin, direction, t_min, t_max, as the caller gave them. Lanes use its direction scaled to unit length and
-// its origin relative to the local origin, rounded to `real`: both within the errors that triangle.cl and box.cl allow for.
+// A GivenRay comes as the caller gave it. Its direction is scaled in place by a power of two, without rounding, that brings its largest
+// component into [1, 2), and its limits with it, so that no length over- or underflows; `scale` keeps that power for cast_finish.
+// Lanes use the direction at unit length and the origin relative to the local origin, rounded to `real`: both within the errors that
+// triangle.cl and box.cl allow for.
+#define FIRST_HIT 0
+#define ANY_HIT 1
+#define COUNT_HITS 2
 
+// False for a ray that is known to miss: a NaN, an infinity, no direction, an empty interval.
+HOT int ray_scaled(global GivenRay *ray) {
+    double largest = 0, size;
+    int good = ray->t_min < ray->t_max;
+    for (int a = 0; a < 3; a++) {
+        size = fabs(ray->direction[a]);
+        good &= size < INFINITY && fabs(ray->origin[a]) < INFINITY;
+        largest = size > largest ? size : largest;
+    }
+    if (!good || largest == 0) return 0;
+    // The exponent from its bits; both powers stay in range, and below 2^-1022 the largest component stays below 1.
+    const long biased = (long)(as_ulong(largest) >> 52), exponent = (biased < 1 ? 1 : biased > 2045 ? 2045 : biased) - 1023;
+    const double inverse = as_double((ulong)(1023 + exponent) << 52);
+    ray->scale = as_double((ulong)(1023 - exponent) << 52);
+    for (int a = 0; a < 3; a++) ray->direction[a] *= ray->scale;
+    ray->t_min *= inverse;
+    ray->t_max *= inverse;
+    return 1;
+}
+
+// result: the slot of the hit or -1 a ray, or for COUNT_HITS the number of hits.
 // The hint keeps a compiler's own vectoriser (Intel's) off lanes that are vectors already: it would take seconds, for slower code.
 kernel __attribute__((vec_type_hint(real_n)))
 void cast(global const int2 *nodes, global const int *indices, global const Triangle *triangles, global const double *vertices,
           global const Object *objects, global const Surface *surfaces, int object_count, int slot_count, double4 local_origin,
-          real extent, global const double *given, int count, int any_hit, global int *last, global real *last_t
+          real extent, global GivenRay *given, global int *result, int count, int mode
           //@ parameters
 ) {
     const int first = get_global_id(0) * LANES;
@@ -29,34 +55,24 @@ void cast(global const int2 *nodes, global const int *indices, global const Tria
     //@ begin
     Rays rays;
     Hits hits;
-    real from[3][LANES], along[3][LANES], low[LANES], high[LANES], after_t[LANES];
-    lane_int active[LANES], after[LANES];
+    real from[3][LANES], along[3][LANES], low[LANES], high[LANES];
+    lane_int active[LANES], slot[LANES];
+    int hit_count[LANES];
     for (int k = 0; k < LANES; k++) {
-        const int i = min(first + k, count - 1);
-        global const double *ray = given + 8 * (size_t)i;
-        double largest = 0, length = 0;
-        int finite = 1;
+        global GivenRay *ray = given + first + k;
+        const int good = first + k < count && ray_scaled(ray);
+        const double length = good ? sqrt(ray->direction[0] * ray->direction[0] + ray->direction[1] * ray->direction[1] +
+                                          ray->direction[2] * ray->direction[2]) : 1.0;
         for (int a = 0; a < 3; a++) {
-            finite &= fabs(ray[a]) < INFINITY && fabs(ray[3 + a]) < INFINITY;
-            largest = fmax(largest, fabs(ray[3 + a]));
+            from[a][k] = good ? (real)(ray->origin[a] - geometry.local_origin[a]) : R(0.0);
+            along[a][k] = good ? (real)(ray->direction[a] / length) : R(1.0);
         }
-        // Scaled by a power of two first, so that no direction over- or underflows.
-        const int exponent = finite && largest > 0 ? ilogb(largest) : 0;
-        for (int a = 0; a < 3; a++) length += ldexp(ray[3 + a], -exponent) * ldexp(ray[3 + a], -exponent);
-        length = ldexp(sqrt(length), exponent);
-        // A miss that is known: no direction, an empty or unordered interval. A next hit is sought only after a last one.
-        finite &= largest > 0 && ray[6] < ray[7] && first + k < count && last[i] > -2;
-        active[k] = finite ? -1 : 0;
-        for (int a = 0; a < 3; a++) {
-            from[a][k] = finite ? (real)(ray[a] - geometry.local_origin[a]) : R(0.0);
-            along[a][k] = finite ? (real)(ldexp(ray[3 + a], -exponent) / ldexp(length, -exponent)) : R(1.0);
-        }
-        low[k] = finite ? (real)(ray[6] * length) : R(0.0);
-        high[k] = finite ? (real)(ray[7] * length) : R(0.0);
+        low[k] = good ? (real)(ray->t_min * length) : R(0.0);
+        high[k] = good ? (real)(ray->t_max * length) : R(0.0);
         low[k] -= fabs(low[k]) * (R(2.0) * UNIT_ROUNDOFF);
         high[k] += fabs(high[k]) * (R(2.0) * UNIT_ROUNDOFF);
-        after[k] = last[i];
-        after_t[k] = last_t[i];
+        active[k] = good ? -1 : 0;
+        hit_count[k] = 0;
     }
     for (int a = 0; a < 3; a++) {
         rays.origin[a] = load_lanes(from[a]);
@@ -68,72 +84,96 @@ void cast(global const int2 *nodes, global const int *indices, global const Tria
     rays.active = load_lanes(active);
     rays.given = given;
     rays.first = first;
-    rays.after = load_lanes(after);
-    rays.after_t = load_lanes(after_t);
+    rays.after = (mask_n)-1;
+    rays.after_t = (real_n)0;
     rays_prepare(&rays, extent);
-    hits.t = rays.t_max;
-    hits.slot = (mask_n)-1;
-    //@ hits_begin
-    scene_trace(&geometry, &rays, 0, any_hit, &hits);
-    lane_int slot[LANES];
-    real t[LANES];
-    store_lanes(choose(rays.active, hits.slot, (mask_n)-1), slot);
-    store_lanes(hits.t, t);
-    for (int k = 0; k < LANES && first + k < count; k++) {
-        last[first + k] = slot[k] < 0 ? -2 : (int)slot[k];
-        last_t[first + k] = t[k];
+    // To count, one hit is sought after the other, in the order of t and id, until no lane has a further one.
+    for (int round = 0; round <= slot_count; round++) {
+        hits.t = rays.t_max;
+        hits.slot = (mask_n)-1;
+        //@ hits_begin
+        if (any_lane(rays.active)) scene_trace(&geometry, &rays, 0, mode == ANY_HIT, &hits);
+        hits.slot = choose(rays.active, hits.slot, (mask_n)-1);
+        if (mode != COUNT_HITS) break;
+        rays.active = is_at_least(hits.slot, NO_LANES);
+        if (!any_lane(rays.active)) break;
+        rays.after = hits.slot;
+        rays.after_t = hits.t;
+        store_lanes(rays.active, active);
+        for (int k = 0; k < LANES; k++) hit_count[k] -= (int)active[k];
     }
+    store_lanes(hits.slot, slot);
+    for (int k = 0; k < LANES && first + k < count; k++) result[first + k] = mode == COUNT_HITS ? hit_count[k] : (int)slot[k];
 }
 
-// t, u, v of each hit by the numbers as given, in float64: (t, u, v, unused) a ray.
-kernel void cast_finish(global const double *vertices, global const double *given, int count, global const int *last, global double *result) {
+// corner - (origin + s direction), a component: the difference and the product as unevaluated sums (Knuth 1969; Dekker 1971 by FMA), so
+// that it is off by at most 2u of itself and 4u^2 of |corner - origin| + |s direction|, u = 2^-53.
+HOT double corner_seen(double corner, double origin, double direction, double s) {
+    const double high = corner - origin, part = high - corner, low = (corner - (high - part)) - (origin + part);
+    const double product = s * direction, rest = fma(s, direction, -product);
+    return (high - product) + (low - rest);
+}
+
+// The record of each first hit, by the numbers as given, in float64. With a = v0 - o, n = e1 x e2 and rate = d.n:
+//   t = a.n / rate,  u = d.(e2 x a) / rate,  v = d.(a x e1) / rate.
+// No multiple of d added to a changes u and v, so they are taken from `near` = a - s d at s = t but for rounding, which is no longer than
+// the triangle however far the origin is; and t = s + near.n / rate.
+kernel void cast_finish(global const double *vertices, global const HitSource *sources, global const GivenRay *given,
+                        global const int *result, int count, global HitRecord *records) {
     const int i = get_global_id(0);
     if (i >= count) return;
-    global double *out = result + 4 * (size_t)i;
-    out[0] = INFINITY;
-    out[1] = out[2] = out[3] = 0;
-    if (last[i] < 0) return;
-    global const double *ray = given + 8 * (size_t)i, *v = vertices + 9 * (size_t)last[i];
-    double corner[3][3], e1[3], e2[3], normal[3], edge[3], n[3];
-    const double direction[3] = {ray[3], ray[4], ray[5]};
-    for (int a = 0; a < 3; a++) {
-        for (int c = 0; c < 3; c++) corner[c][a] = v[3 * c + a] - ray[a];
-        e1[a] = v[3 + a] - v[a];
-        e2[a] = v[6 + a] - v[a];
+    const int slot = result[i];
+    if (slot < 0) {
+        const HitRecord miss = {INFINITY, 0, 0, -1, -1, {0, 0, 0}};
+        records[i] = miss;
+        return;
     }
-    cross_double(e1, e2, normal);
-    const double rate = dot_double(direction, normal);
-    for (int c = 0; c < 3; c++) {
-        cross_double(corner[(c + 1) % 3], corner[(c + 2) % 3], n);
-        edge[c] = dot_double(direction, n);
+    global const double *corners = vertices + 9 * (size_t)slot;
+    global const GivenRay *ray = given + i;
+    double a[3], d[3], e1[3], e2[3], n[3], near[3], cross[3];
+    for (int axis = 0; axis < 3; axis++) {
+        a[axis] = corners[axis] - ray->origin[axis];
+        d[axis] = ray->direction[axis];
+        e1[axis] = corners[3 + axis] - corners[axis];
+        e2[axis] = corners[6 + axis] - corners[axis];
     }
-    out[0] = dot_double(corner[0], normal) / rate;
-    out[1] = edge[1] / rate;
-    out[2] = edge[2] / rate;
+    cross_double(e1, e2, n);
+    const double rate = dot_double(d, n), s = dot_double(a, n) / rate;
+    for (int axis = 0; axis < 3; axis++) near[axis] = corner_seen(corners[axis], ray->origin[axis], d[axis], s);
+    double t = s + dot_double(near, n) / rate;
+    cross_double(e2, near, cross);
+    double u = dot_double(d, cross) / rate;
+    cross_double(near, e1, cross);
+    double v = dot_double(d, cross) / rate;
     //@ finish
+    global HitRecord *record = records + i;
+    record->t = t * ray->scale;
+    record->u = u;
+    record->v = v;
+    record->prim_id = sources[slot].prim_id;
+    record->object_id = sources[slot].object_id;
+    for (int axis = 0; axis < 3; axis++) record->normal[axis] = sources[slot].normal[axis];
 }
 
 //@hook rays_members
-    global const double *given;   // 8 a ray, of which lane 0 is number `first`
+    global const GivenRay *given;  // lane 0 is number `first`
     int first;
-    mask_n after;                 // the slot of each ray's last hit: only hits after it, by t and primitive id, count; or -1
+    mask_n after;                  // the slot of each ray's last hit: only hits after it, by t and primitive id, count; or -1
     real_n after_t;
 //@end
 //@hook ray_given
-    global const double *ray = rays->given + 8 * (size_t)(rays->first + lane);
+    global const GivenRay *ray = rays->given + rays->first + lane;
     for (int a = 0; a < 3; a++) {
-        origin[a] = ray[a];
-        direction[a] = ray[3 + a];
+        origin[a] = ray->origin[a];
+        direction[a] = ray->direction[a];
     }
-    *t_min = ray[6];
-    *t_max = ray[7];
+    *t_min = ray->t_min;
+    *t_max = ray->t_max;
     return;
 //@end
 //@hook ray_length
-    global const double *d = rays->given + 8 * (size_t)(rays->first + lane) + 3;
-    const int exponent = ilogb(fmax(fabs(d[0]), fmax(fabs(d[1]), fabs(d[2]))));
-    const double x = ldexp(d[0], -exponent), y = ldexp(d[1], -exponent), z = ldexp(d[2], -exponent);
-    return ldexp(sqrt(x * x + y * y + z * z), exponent);
+    global const double *d = (rays->given + rays->first + lane)->direction;
+    return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 //@end
 //@hook accept
     if (any_lane(hit & is_at_least(rays->after, NO_LANES))) {

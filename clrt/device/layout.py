@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-_C_NAMES = {np.dtype(np.int32): "int", np.dtype(np.float64): "double", np.dtype(np.float32): "float"}
+_C_NAMES = {np.dtype(np.int32): "int", np.dtype(np.int64): "long", np.dtype(np.float64): "double", np.dtype(np.float32): "float"}
 
 Field = tuple[str, Any] | tuple[str, Any, int | tuple[int, ...]]
 
@@ -75,3 +75,17 @@ def light(real: type) -> np.dtype[np.void]:
 
 def sphere(real: type) -> np.dtype[np.void]:
     return struct_dtype([("center", real, (3,)), ("radius", real), ("material", np.int32)])
+
+
+_F8_VECTOR: Any = (np.float64, (3,))
+
+#: a ray of a caller's array, in float64; `scale` is the kernel's own
+GIVEN_RAY = struct_dtype(
+    [("origin", *_F8_VECTOR), ("direction", *_F8_VECTOR), ("t_min", np.float64), ("t_max", np.float64), ("scale", np.float64)]
+)
+#: what the record of a hit tells of the triangle
+HIT_SOURCE = struct_dtype([("prim_id", np.int64), ("object_id", np.int64), ("normal", *_F8_VECTOR)])
+#: a first hit, as callers get it
+HIT_RECORD = struct_dtype(
+    [("t", np.float64), ("u", np.float64), ("v", np.float64), ("prim_id", np.int64), ("object_id", np.int64), ("normal", *_F8_VECTOR)]
+)
