@@ -27,7 +27,7 @@ from clrt.stats import ObjectStats, RunStats
 Progress = Callable[[str, float], None]
 
 MAX_PIXELS = 1 << 28
-MAX_DEPTH = 64
+MAX_DEPTH = 128
 _LAUNCH_S = 0.15  #: a launch is to take about this long, so that Ctrl-C and progress come between launches
 _FIRST_LAUNCH = 1 << 20  #: rays at most, by a rough count, in the first launch, whose speed is not known yet
 
@@ -55,7 +55,7 @@ def render(
 ) -> Image:
     """The picture of `scene`, with the figures of the run in its `stats`.
 
-    size : (width, height) in pixels; depth : reflections and refractions in a row, 0 to 64; count : run a second, counting pass
+    size : (width, height) in pixels; depth : reflections and refractions in a row, 0 to 128; count : run a second, counting pass
     dump_kernel : where to write the OpenCL program. Raises DeviceError, LimitError, ClrtError, OSError.
     """
     start = time.perf_counter()

@@ -226,8 +226,8 @@ def test_quick_run_measures_everything(tmp_path: Path) -> None:
     (path,) = tmp_path.iterdir()
     results = json.loads(path.read_text())
     assert set(results) == {
-        "started", "finished", "quick", "machine", "load_before", "load_after", "plan", "scenes", "trees", "versus", "ladder", "tests", "command",
-        "programs", "marks",
+        "started", "finished", "quick", "machine", "load_before", "load_after", "plan", "scenes", "trees", "versus", "ladder", "tests",
+        "command", "programs", "marks",
     }  # fmt: skip
     assert {"cpu", "cores", "memory_gib", "os", "python", "opencl_platform", "opencl_driver", "packages"} <= set(results["machine"])
     sphere, rabbit = ("sphere (generated)", False), ("rabbit-like (generated)", True)

@@ -127,7 +127,7 @@ def test_defaults_of_what_the_text_leaves_out() -> None:
     assert (scene.lights[0].color, scene.source) == ((1, 1, 1), "scene.txt")
 
 
-@pytest.mark.parametrize("depth", [0, 64])
+@pytest.mark.parametrize("depth", [0, 128])
 def test_depth_takes_its_bounds(depth: int) -> None:
     assert build(FLAT, f"depth {depth}").depth == depth
 

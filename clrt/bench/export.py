@@ -50,7 +50,10 @@ def check_docs(root: Path) -> None:
 
 
 def write_docs(results: dict[str, Any], root: Path) -> list[Path]:
-    """Put all tables into docs/performance.md, the main ones into README.md, the ladder into docs/numerics.md; returns these. Raises as `check_docs`."""
+    """Put all tables into docs/performance.md, the main ones into README.md, the ladder into docs/numerics.md; returns these.
+
+    Raises as `check_docs`.
+    """
     if results["quick"]:
         raise ClrtError("a quick run is not for the documentation; leave out --quick")
     check_docs(root)

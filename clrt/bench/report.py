@@ -30,7 +30,8 @@ def tables(results: dict[str, Any]) -> list[Table]:
     """All tables of a run, the marks first."""
     return [
         marks_table(results["marks"]), trees_table(results["trees"]), versus_table(results["versus"], results["machine"]["cores"]),
-        ladder_table(results["ladder"]), tests_table(results["tests"]), command_table(results["command"]), programs_table(results["programs"]),
+        ladder_table(results["ladder"]), tests_table(results["tests"]), command_table(results["command"]),
+        programs_table(results["programs"]),
     ]  # fmt: skip
 
 

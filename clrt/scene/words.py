@@ -14,7 +14,7 @@ from clrt.scene.grammar import Field, color_fields
 from clrt.scene.model import Material, PointLight
 from clrt.scene.tokens import Token, read_in_range
 
-GREATEST_DEPTH = 64  #: reflections and refractions in a row; bounds the stacks of every renderer
+GREATEST_DEPTH = 128  #: reflections and refractions in a row; bounds the stacks of every renderer
 
 Value = float | str
 
