@@ -31,8 +31,9 @@ static __attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry
         }
         test[k] = hit ? -1 : 0;
         if (hit) {
+            // t to within 2^-24 + 2^-24, and 2^-24 for its rounding: less than the 4u = 2^-22 that its interval has.
             double at = plane.offset / plane.rate;
-            if (fabs(plane.rate) <= 0x1p20 * plane.rate_error || fabs(plane.offset) <= 0x1p20 * plane.offset_error) {
+            if (fabs(plane.rate) <= 0x1p24 * plane.rate_error || fabs(plane.offset) <= 0x1p24 * plane.offset_error) {
                 Expansion offset, rate;
                 exact_distance(geometry, origin, direction, slot, &offset, &rate);
                 at = expansion_value(&offset) / expansion_value(&rate);

@@ -6,7 +6,9 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
     if (!any_lane(hit)) return;
     const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared_origin);
     const real_n t = plane.t;
-    hit &= ~plane.grazing & is_greater(t, rays->t_min) & is_less(t, hits->t) & ~is_equal(rays->skip, (mask_n)slot);
+    mask_n closer = is_less(t, hits->t);
+    //@ tie
+    hit &= ~plane.grazing & is_greater(t, rays->t_min) & closer & ~is_equal(rays->skip, (mask_n)slot);
     //@ accept
     hits->t = choose(hit, t, hits->t);
     hits->slot = choose(hit, (mask_n)slot, hits->slot);

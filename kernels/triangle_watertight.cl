@@ -56,7 +56,9 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
         hit = (hit & ~grazing) | triangle_grazing(&seen, &copy, slot, shared_origin, grazing, &distance);
         t = distance;
     }
-    hit &= is_greater(t, rays->t_min) & is_less(t, hits->t) & ~is_equal(rays->skip, (mask_n)slot);
+    mask_n closer = is_less(t, hits->t);
+    //@ tie
+    hit &= is_greater(t, rays->t_min) & closer & ~is_equal(rays->skip, (mask_n)slot);
     //@ accept
     hits->t = choose(hit, t, hits->t);
     hits->slot = choose(hit, (mask_n)slot, hits->slot);

@@ -187,7 +187,10 @@ def check_limits(precision: Precision, lanes: int, shape: Shape, features: Featu
 
 
 OPTIONS = ("-cl-std=CL1.2",)
-_UNSAFE = ("fast-relaxed-math", "unsafe-math", "finite-math", "ffast-math", "no-signed-zeros", "mad-enable")
+_UNSAFE = (
+    "fast-relaxed-math", "unsafe-math", "finite-math", "ffast-math", "no-signed-zeros", "mad-enable", "single-precision-constant",
+    "denorms-are-zero",
+)  # fmt: skip
 
 
 def check_options(options: tuple[str, ...]) -> None:
