@@ -86,8 +86,9 @@ def list_devices() -> list[DeviceInfo]:
 
 
 def open_device(name: str | None = None) -> Device:
-    """The device whose name or platform contains `name` (any case); the default one for None or an empty name.
+    """The device whose platform or name contains `name` (any case); the default one for None or an empty name.
 
+    A platform comes before a name: two platforms' devices may be one processor, and PoCL's name holds the processor's maker.
     Raises DeviceError with the list of devices where none fits, or where the device lacks float64, in which
     the records that rays test are computed.
     """
@@ -101,7 +102,7 @@ def open_device(name: str | None = None) -> Device:
         if not fitting:
             there = "; ".join(f"'{h.name.strip()}' ({h.platform.name.strip()})" for h in handles)
             raise DeviceError(f"no OpenCL device is called '{name}'; there is: {there}")
-        chosen = fitting[0]
+        chosen = min(fitting, key=lambda i: wanted not in handles[i].platform.name.lower())
     handle = handles[chosen]
     info = _info(handle, default=chosen == 0)
     if not info.fp64:

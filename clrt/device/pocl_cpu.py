@@ -34,7 +34,8 @@ _PROCESSORS: tuple[tuple[set[str], str], ...] = (
 )
 _RECORD_BYTES = 2048  # the name stands in the first kilobyte of PoCL 3.0's record
 _UNKNOWN = b"generic\0"
-_names: list[Any] = []  # the texts that records point to live as long as the process
+#: address of a device's record -> the text it points to, which lives as long as the process
+_named: dict[int, Any] = {}
 
 
 def processor_name(flags: set[str]) -> str:
@@ -74,20 +75,19 @@ def name_processor(handle: Any) -> str | None:
 
     Raises DeviceError where PoCL does not know the processor and cannot be told.
     """
-    if not handle.version.rstrip().endswith("-generic") or os.uname().machine != "x86_64":
+    # A record is searched once: were it searched again, a pointer left over behind it would come first.
+    if not handle.version.rstrip().endswith("-generic") or os.uname().machine != "x86_64" or handle.int_ptr in _named:
         return None
     try:
         slots = _slots_of_unknown(handle.int_ptr)
     except OSError:
         slots = []
     if not slots:
-        if _names:
-            return None  # named before in this process
         raise DeviceError(
             f"PoCL ({handle.driver_version.strip()}) does not know this processor and cannot be told its name; "
             "install a newer PoCL, or Intel's runtime (pip install intel-opencl-rt)"
         )
     text = ctypes.create_string_buffer(processor_name(_cpu_flags()).encode())
-    _names.append(text)
+    _named[handle.int_ptr] = text
     ctypes.c_uint64.from_address(handle.int_ptr + slots[0]).value = ctypes.addressof(text)
     return text.value.decode()
