@@ -61,11 +61,11 @@ class Film:
         if samples.shape[1:] != self.mean.shape:
             raise ClrtError(f"a picture of the shape {np.shape(pictures)} does not fit a film of {self.mean.shape}")
         with np.errstate(invalid="ignore"):
-            good = (np.abs(samples) <= self.limit).all(axis=-1)
+            good = np.asarray((np.abs(samples) <= self.limit).all(axis=-1))
         if good.all():
             count, kept = np.full_like(self.count, len(samples)), samples
         else:
-            count, kept = np.count_nonzero(good, axis=0), np.where(good[..., None], samples, 0.0)
+            count, kept = np.asarray(np.count_nonzero(good, axis=0), np.int64), np.where(good[..., None], samples, 0.0)
         mean = kept.sum(axis=0) / np.maximum(count, 1)[..., None]
         spread = kept - mean
         if kept is not samples:

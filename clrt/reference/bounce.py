@@ -22,7 +22,7 @@ STACK_SIZE = 8  #: dielectrics a ray can be inside of at once
 
 @dataclass(frozen=True, eq=False)
 class MediumStack:
-    """For m rays: object (m, 8) ids of the dielectrics entered, ior (m, 8) their indices, rank (m, 8), count (m,) entries in use, oldest first."""
+    """For m rays: object (m, 8) ids of the dielectrics entered, their ior (m, 8) and rank (m, 8), count (m,) in use, oldest first."""
 
     object: IndexArray
     ior: FloatArray
@@ -31,7 +31,8 @@ class MediumStack:
 
     @classmethod
     def outside(cls, m: int) -> MediumStack:
-        return cls(np.full((m, STACK_SIZE), -1, np.int64), np.ones((m, STACK_SIZE)), np.full((m, STACK_SIZE), -1, np.int64), np.zeros(m, np.int64))
+        nobody = np.full((m, STACK_SIZE), -1, np.int64)
+        return cls(nobody, np.ones((m, STACK_SIZE)), nobody, np.zeros(m, np.int64))
 
     def __getitem__(self, rows: IndexArray) -> MediumStack:
         return MediumStack(self.object[rows], self.ior[rows], self.rank[rows], self.count[rows])
@@ -60,10 +61,12 @@ class MediumStack:
             rank = np.where(self._used, self.rank, -1).max(axis=1) + 1
         # Leaving: the entries above move down by one.
         source = np.minimum(place + (leaving[:, None] & (place >= held.argmax(axis=1)[:, None])), STACK_SIZE - 1)
-        ids, iors, ranks = (np.take_along_axis(a, source, axis=1) for a in (self.object, self.ior, self.rank))
+        ids, ranks = (np.take_along_axis(a, source, axis=1) for a in (self.object, self.rank))
+        iors = np.take_along_axis(self.ior, source, axis=1)
         new = ~leaving[:, None] & (place == np.minimum(self.count, STACK_SIZE - 1)[:, None])
         count = np.where(leaving, self.count - 1, np.minimum(self.count + 1, STACK_SIZE))
-        return MediumStack(*(np.where(new, a[:, None], b) for a, b in ((object_id, ids), (ior, iors), (rank, ranks))), count)
+        ids, ranks = (np.where(new, a[:, None], b) for a, b in ((object_id, ids), (rank, ranks)))
+        return MediumStack(ids, np.where(new, ior[:, None], iors), ranks, count)
 
     def crossed_at(self, rows: IndexArray, object_id: IndexArray, ior: FloatArray, rank: IndexArray) -> MediumStack:
         """As `crossed`, for these rows alone."""

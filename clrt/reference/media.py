@@ -1,4 +1,4 @@
-"""What decides the medium where objects of glass overlap: their ranks, the eye's own media, walls that coincide. See docs/conventions.md."""
+"""Which medium is around a ray where objects of glass overlap: ranks, the eye's media, coincident walls. See docs/conventions.md."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
-PROBES = np.array([[0.3719, -0.6143, 0.6959], [0.7431, 0.5923, 0.3117], [-0.5573, 0.2287, -0.7981]])  #: directions that meet edges by chance alone
+#: directions that meet edges by chance alone
+PROBES = np.array([[0.3719, -0.6143, 0.6959], [0.7431, 0.5923, 0.3117], [-0.5573, 0.2287, -0.7981]])
 STEEPEST = 1e-3  #: cosine below which a slanted hit widens the point no further
 
 
@@ -41,7 +42,7 @@ def _box(prims: Primitives, members: IndexArray) -> tuple[FloatArray, FloatArray
 
 
 def around(prims: Primitives, rank: IndexArray, point: FloatArray, tile_bytes: int) -> list[int]:
-    """Objects of glass around `point`, by rank: spheres that it is inside of, meshes that every probe leaves through an odd number of walls."""
+    """Objects of glass around `point`, by rank: spheres it is inside of, meshes that every probe leaves through an odd number of walls."""
     m = len(PROBES)
     rays = Rays(np.tile(point, (m, 1)), PROBES, np.full(m, -1, np.int64), np.zeros(m), np.ones(m))
     found = find_crossings(prims, rays, tile_bytes)
@@ -67,7 +68,7 @@ def walls(
     here &= (other < prims.triangle_count) & (prims.object_id[other] != prims.object_id[prim[at]])
     here &= (materials.refract[prims.material[other]] > 0.0) & (materials.refract[prims.material[prim[at]]] > 0.0)
     here &= prim[at] < prims.triangle_count
-    pairs = {}
+    pairs: dict[tuple[int, int], int] = {}
     for row, wall in zip(at[here].tolist(), other[here].tolist(), strict=True):
         pairs.setdefault((row, int(prims.object_id[wall])), wall)
     rounds: list[dict[int, int]] = []

@@ -57,7 +57,7 @@ def ranks(scene: Scene) -> IntArray:
 
 
 def around_eye(scene: Scene) -> list[int]:
-    """Objects that let light through and have the eye inside of them, by rank. A mesh counts where all probes cross it an odd number of times."""
+    """Objects that let light through and have the eye inside of them, by rank; a mesh, where all probes cross it an odd number of times."""
     rank, eye, count = ranks(scene), np.asarray(scene.camera.eye, np.float64), len(scene.objects)
     which = np.flatnonzero(rank != NONE)
     if not len(which):
@@ -65,10 +65,13 @@ def around_eye(scene: Scene) -> list[int]:
     lo, hi = _boxes(scene, which)
     near = which[((lo < eye) & (eye < hi)).all(1)]
     spheres = scene.spheres
-    inside = [
-        int(i) for i in near
-        if (np.linalg.norm(eye - spheres.centers[i - count]) < spheres.radii[i - count] if i >= count else _encloses(scene.objects[i].vertices, eye))
-    ]  # fmt: skip
+
+    def holds(i: int) -> bool:
+        if i < count:
+            return _encloses(scene.objects[i].vertices, eye)
+        return bool(np.linalg.norm(eye - spheres.centers[i - count]) < spheres.radii[i - count])
+
+    inside = [i for i in near.tolist() if holds(i)]
     return sorted(inside, key=lambda i: int(rank[i]))
 
 

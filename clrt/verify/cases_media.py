@@ -15,7 +15,7 @@ from clrt.scene.build import parse_scene
 from clrt.scene.model import Scene
 from clrt.verify import pictures, probe
 from clrt.verify.case import ALL, Context, Outcome, case
-from clrt.verify.pictures import camera, line
+from clrt.verify.pictures import camera
 
 FloatArray = NDArray[np.float64]
 Wide = np.longdouble
@@ -28,7 +28,8 @@ kernel void probe_snell(global const real *d, global const real *n, global const
     passes[i] = refraction_snell(from, about, ratio[i], to);
     for (int a = 0; a < 3; a++) turned[3 * i + a] = to[a];
 }
-kernel void probe_fresnel(global const real *cosine, global const real *n1, global const real *n2, global real *back, global real *through) {
+kernel void probe_fresnel(global const real *cosine, global const real *n1, global const real *n2, global real *back,
+                          global real *through) {
     const int i = get_global_id(0);
     back[i] = fresnel_dielectric(cosine[i], n1[i], n2[i]);
     through[i] = fresnel_transmitted(cosine[i], n1[i], n2[i]);
@@ -106,7 +107,9 @@ def critical_angle(context: Context) -> Outcome:
 def equal_indices(context: Context) -> Outcome:
     """F = 0, T = 1, and the ray goes straight on."""
     rng, count = context.rng(44), context.share(0.1)
-    sine = np.concatenate([np.zeros(count // 4), rng.uniform(0, 1, count // 2), 1 - 10.0 ** rng.uniform(-12, -1, count - count // 4 - count // 2)])
+    sine = np.concatenate(
+        [np.zeros(count // 4), rng.uniform(0, 1, count // 2), 1 - 10.0 ** rng.uniform(-12, -1, count - count // 4 - count // 2)]
+    )
     index = rng.uniform(1, 2.5, count)
 
     def wrong(rung: str) -> int:
@@ -141,16 +144,19 @@ def _exact_fresnel(cosine: FloatArray, n1: FloatArray, n2: FloatArray) -> tuple[
 def fresnel_limits(context: Context) -> Outcome:
     """Both shares, reflected and transmitted, within 1e-5 of themselves."""
     rng, count = context.rng(45), context.share(0.2)
-    cosine = np.concatenate([10.0 ** rng.uniform(-8, 0, count // 2), rng.uniform(0, 1, count - count // 2)]).astype(np.float32)
+    cosine: NDArray[np.float32] = np.concatenate([10.0 ** rng.uniform(-8, 0, count // 2), rng.uniform(0, 1, count - count // 2)]).astype(
+        np.float32
+    )
     cosine[::7] = 1e-8
     n1 = rng.uniform(1, 2.5, count).astype(np.float32)
     n2 = np.where(rng.random(count) < 0.5, rng.uniform(1, 2.5, count).astype(np.float32), np.nextafter(n1, np.float32(9)))
-    back, through = _exact_fresnel(cosine, n1, n2)
+    given = [a.astype(np.float64) for a in (cosine, n1, n2)]
+    back, through = _exact_fresnel(*given)
 
     def off(f: NDArray[np.floating], t: NDArray[np.floating]) -> int:
         return int(np.count_nonzero(~((np.abs(f - back) <= 1e-5 * back) & (np.abs(t - through) <= 1e-5 * through))))
 
-    counts = context.each_rung(lambda rung: off(*_fresnel(context, rung, cosine, n1, n2)))
+    counts = context.each_rung(lambda rung: off(*_fresnel(context, rung, *given)))
     ratio = n1 / n2
     square = 1 - ratio * ratio * (1 - cosine * cosine)
     inner = np.sqrt(np.maximum(square, 0))
@@ -186,7 +192,7 @@ def _view(size: int, fov: float, z: float = 0.0) -> str:
 def _seen(scene: Scene, layers: list[tuple[float, float]], first: float, wall: float) -> tuple[FloatArray, NDArray[np.bool_]]:
     """The colours behind plane layers, (thickness, index) each from the eye on, and which pixels are certain.
 
-    By Snell, n sin is the same in every layer: `first` times the sine at the eye. A pixel that leads within 1e-3 of a card's edge, or of the
+    By Snell, n sin is the same in every layer: `first` times the sine at the eye. A pixel that leads within 1e-3 of a card's edge or the
     critical angle of a layer, is not certain; where a layer reflects it totally it is black.
     """
     d = scene.camera.directions()
@@ -231,7 +237,9 @@ def nested(context: Context) -> Outcome:
         naive.append(_seen(scene, [(1.2, 1.0), (1.8, 1.5), (0.2, 1.0)], 1.0, 1.0)[0])  # the outermost index alone
     overlapping = {1.7: (1.0, 2.2, 40.0), 1.3: (1.8, 3.0, 40.0)}
     for first, second in ((1.7, 1.3), (1.3, 1.7)):  # the second has the say between 1.8 and 2.2
-        text = _view(64, 22.0) + "depth 8\n" + _cards(3.2) + "".join(_glass(index) + _slab(*overlapping[index]) for index in (first, second))
+        text = (
+            _view(64, 22.0) + "depth 8\n" + _cards(3.2) + "".join(_glass(index) + _slab(*overlapping[index]) for index in (first, second))
+        )
         scene = parse_scene(text)
         middle = [(0.8, 1.7), (1.2, 1.3)] if second == 1.3 else [(1.2, 1.7), (0.8, 1.3)]
         scenes.append((scene, *_seen(scene, [(1.0, 1.0), *middle, (0.2, 1.0)], 1.0, 1.0)))
@@ -257,7 +265,11 @@ def camera_inside(context: Context) -> Outcome:
 @case(48, "coincident nested walls", provokes="one event for two walls", oracle="S", promised=ALL)
 def coincident(context: Context) -> Outcome:
     """Water that fills a glass to its very walls, in both orders of the text."""
-    shell = pictures.triangles(pictures.box((-40, -40, 1.0), (40, 40, 2.0))) + pictures.triangles(pictures.box((-39, -39, 1.2), (39, 39, 1.7))) + "O\n"
+    shell = (
+        pictures.triangles(pictures.box((-40, -40, 1.0), (40, 40, 2.0)))
+        + pictures.triangles(pictures.box((-39, -39, 1.2), (39, 39, 1.7)))
+        + "O\n"
+    )
     water = _slab(1.2, 1.7, 39.0)
     layers = [(1.0, 1.0), (0.2, 1.5), (0.5, 1.33), (0.3, 1.5), (0.2, 1.0)]
     scenes, naive = [], []
@@ -274,11 +286,15 @@ KEPT = 0.99  #: of the light, at each total reflection
 
 @case(49, "100 internal reflections", provokes="drift", oracle="S", promised=ALL)
 def many_reflections(context: Context) -> Outcome:
-    """Along a square rod of glass: each pixel has lost what the reflections on its way, counted by unfolding the rod, take: within 1e-4."""
+    """Along a square rod of glass: what is left after the reflections on each pixel's way, counted by unfolding the rod: within 1e-4."""
     half, size = 0.025, 32
     rod = pictures.triangles(pictures.box((-half, -half, 0.5), (half, half, 6.0))) + "O\n"
-    text = _view(size, 100.0, 0.499) + f"depth {64}\nM 1 1 1 0 0 0 1 0 {KEPT!r} 1.6\n" + rod
-    text += "M 1 1 1 1 0 0 1 0\n" + pictures.triangles(pictures.quads(np.array([[(-1, -1, 6.1), (1, -1, 6.1), (1, 1, 6.1), (-1, 1, 6.1)]]))) + "O\n"
+    text = _view(size, 100.0, 0.499) + f"depth 64\nM 1 1 1 0 0 0 1 0 {KEPT!r} 1.6\n" + rod
+    text += (
+        "M 1 1 1 1 0 0 1 0\n"
+        + pictures.triangles(pictures.quads(np.array([[(-1, -1, 6.1), (1, -1, 6.1), (1, 1, 6.1), (-1, 1, 6.1)]])))
+        + "O\n"
+    )
     scene = replace(parse_scene(text), depth=REFLECTIONS + 10)
     d = scene.camera.directions()
     inside = d * (1, 1, 0) / 1.6
@@ -296,11 +312,13 @@ def many_reflections(context: Context) -> Outcome:
         renderer.run_rows(tracer, "render", _quiet)
         return int(np.count_nonzero(sure[..., None] & ~(np.abs(tracer.picture() / expected[..., None] - 1) <= 1e-4)))
 
-    return Outcome(int(sure.sum()), context.each_rung(wrong), _drifted(context, 1.6), f"up to {int(turns[sure].max())} reflections in a row")
+    return Outcome(
+        int(sure.sum()), context.each_rung(wrong), _drifted(context, 1.6), f"up to {int(turns[sure].max())} reflections in a row"
+    )
 
 
 def _drifted(context: Context, index: float) -> int:
-    """Rays whose weight is off by more than 1e-4 after REFLECTIONS reflections, with float32 shares 1 - T instead of total reflection's 1."""
+    """Rays whose weight is off by more than 1e-4 after REFLECTIONS, with a computed share in place of total reflection's 1."""
     cosine = context.rng(49).uniform(0.05, 0.2, 1000).astype(np.float32)
     sine = np.sqrt(1 - cosine * cosine) * np.float32(index)
     inner = np.sqrt(np.maximum(1 - sine * sine, np.float32(1e-8)))  # a negative root clamped to something small

@@ -66,12 +66,15 @@ def many_samples(context: Context) -> Outcome:
 def extreme_words(context: Context) -> Outcome:
     """Below 1, at most 2^-24 below the word's fraction, and log(1 - u) finite."""
     ends = np.arange(2048, dtype=np.uint64)
-    words = np.concatenate([ends, 2**32 - 1 - ends, 2**31 - 1024 + ends, context.rng(54).integers(0, 2**32, 4096, np.uint64)]).astype(np.uint32)
+    words = np.concatenate([ends, 2**32 - 1 - ends, 2**31 - 1024 + ends, context.rng(54).integers(0, 2**32, 4096, np.uint64)]).astype(
+        np.uint32
+    )
     exact = words.astype(np.float64) / 2.0**32
 
     def wrong(rung: str) -> int:
         u, logarithm = (np.zeros(len(words), rung_named(rung).real) for _ in range(2))
-        probe.run(_UNIFORM, "probe_uniform", len(words), [words, u, logarithm], device=context.device, precision=rung, files=("sampler.cl",))
+        arrays = [words, u, logarithm]
+        probe.run(_UNIFORM, "probe_uniform", len(words), arrays, device=context.device, precision=rung, files=("sampler.cl",))
         fits = (u >= 0) & (u < 1) & np.isfinite(logarithm) & (u <= exact) & (exact - u < 2.0**-24)
         return int(np.count_nonzero(~fits))
 
@@ -193,7 +196,9 @@ def launches(context: Context) -> Outcome:
 
     samples = rng.uniform(0, 1, (64, 64, 64)).astype(np.float32)
     forwards, backwards = (np.cumsum(s, axis=0, dtype=np.float32)[-1] for s in (samples, samples[::-1]))
-    return Outcome(4 * 64 * 64, context.each_rung(wrong), int(np.count_nonzero(forwards != backwards)), "4 launches of a picture; 2 processes")
+    return Outcome(
+        4 * 64 * 64, context.each_rung(wrong), int(np.count_nonzero(forwards != backwards)), "4 launches of a picture; 2 processes"
+    )
 
 
 @case(58, "specialised against all-effects kernel", provokes="an effect that leaks into others", oracle="X", promised=ALL)
@@ -223,6 +228,6 @@ def _contracted(tracer: Tracer):  # type: ignore[no-untyped-def]
     import pyopencl as cl
 
     buffers = tracer.buffers
-    shape = program.Shape(program.stack_size(max((t for t in (24,)), default=0)), buffers.packed.scene.depth, buffers.shared_lights)
+    shape = program.Shape(program.stack_size(23), buffers.packed.scene.depth, buffers.shared_lights)
     source = program.compose(buffers.features, buffers.precision, tracer.lanes, shape)
     return cl.Kernel(program.build(buffers.device, source.replace("FP_CONTRACT OFF", "FP_CONTRACT ON")), "render")

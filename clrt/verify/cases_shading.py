@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from clrt.film import Film
 from clrt.scene.build import parse_scene
+from clrt.scene.model import Scene
 from clrt.verify import pictures
 from clrt.verify.case import ALL, SAFE, Context, Outcome, case
 from clrt.verify.pictures import camera, line, naive_hits
@@ -95,7 +96,7 @@ def sealed_box(context: Context) -> Outcome:
         turn, shift = pictures.rotation(rng) * scale, offset * rng.choice([-1.0, 1.0], 3)
         walls = np.concatenate([pictures.cube(), 0.25 * pictures.cube() @ pictures.rotation(rng).T + (0.1, -0.2, 0.3)]) @ turn.T + shift
         eye = turn @ (-0.7, 0.6, -0.75) + shift
-        lights = [turn @ p + shift for p in rng.normal(size=(3, 3))[:, :, None].squeeze(-1) * 0.2 + 1.3 * np.eye(3) * (1, -1, 1)]
+        lights = [turn @ p + shift for p in rng.normal(size=(3, 3)) * 0.2 + 1.3 * np.diag((1.0, -1.0, 1.0))]
         lights += [turn @ (np.array(corner) * 1.01) + shift for corner in ((1, 1, 1), (-1, 1, -1), (1.0, 0.0, 1.0))]
         text = camera(eye, turn @ (0.7, -0.6, 0.8) / scale, 110.0, size) + "".join(line("L", p) for p in lights)
         scenes.append(parse_scene(text + "M 1 1 1 0 1 1 5 0\n" + pictures.triangles(walls)))
@@ -118,7 +119,7 @@ def light_on_surface(context: Context) -> Outcome:
         # Numbers of 28 bits, so that a corner plus quarters of edges is a float64: the light lies on the triangle to the last bit.
         step = 2.0 ** (np.ceil(np.log2(np.abs(shift).max() + 2 * scale)) - 28)
         floor = pictures.grid(2) @ turn.T + shift
-        ceiling = np.rint(((pictures.grid(1) + (0, 0, 0.8)) @ turn.T + shift) / step) * step
+        ceiling = np.rint(((pictures.grid(1) + np.array((0, 0, 0.8))) @ turn.T + shift) / step) * step
         corner, normal = ceiling[rng.integers(2)], turn[:, 2] / scale
         light = corner[0] + (corner[1] - corner[0]) * 0.25 + (corner[2] - corner[0]) * 0.5
         eye = turn @ (0.1, -0.2, 0.5) + shift
@@ -146,18 +147,18 @@ def contact_gap(context: Context) -> Outcome:
 
     gap = 4 * np.float64(np.spacing(np.float32(1.0)))
     points = np.stack([*context.rng(38).uniform(-0.9, 0.9, (2, 500)), np.zeros(500)], -1)
-    lid = pictures.grid(2) + (0, 0, gap)
+    lid = pictures.grid(2) + np.array((0, 0, gap))
     naive = int(np.count_nonzero(~naive_hits(points, np.array((0.3, 0.2, 2.0)) - points, lid, NAIVE_EPSILON, 1.0)))
     size = scenes[0].camera.width
     return Outcome(len(scenes) * size**2, context.each_rung(wrong), naive, "gaps of 4, 16 and 64 ulp of the coordinate 1")
 
 
-def contact_scene(ulps: float, place: float, size: int = 32):  # type: ignore[no-untyped-def]
+def contact_scene(ulps: float, place: float, size: int = 32) -> Scene:
     """Lower card at height `place`, glass `ulps` float32 ulps of 1 above it; the sky is white, the pixel black."""
     gap = ulps * float(np.spacing(np.float32(1.0)))
     text = camera(np.array((0.1, 0.2, 1.5)), np.array((0.0, 0.0, -1.0)), 40.0, size, np.array((0.0, 1.0, 0.0)))
     text += "L 0.3 0.2 2\nbackground 1 1 1\nM 1 1 1 0 1 0 1 0\n" + pictures.triangles(1.5 * pictures.grid(2) + (0, 0, place))
-    return parse_scene(text + "O\nM 1 1 1 0 0 0 1 0 1 1\n" + pictures.triangles(pictures.grid(2) + (0, 0, place + gap)))
+    return parse_scene(text + "O\nM 1 1 1 0 0 0 1 0 1 1\n" + pictures.triangles(pictures.grid(2) + np.array((0, 0, place + gap))))
 
 
 @case(55, "one sample of 1e30, NaN or infinity", provokes="an infinite picture", oracle="S", promised=ALL)

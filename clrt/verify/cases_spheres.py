@@ -102,7 +102,8 @@ class Balls:
 def _wrong(balls: Balls, t: FloatArray, unit: float) -> tuple[int, int]:
     """Disagreements of t with the truth in roundings of `unit`, and the rays left out as nearer than 4 ulp (8 units) to a tangent.
 
-    With |f| the distance to the center, the line's distance from it is known to 8 unit |f|: what that leaves of the root is allowed, and 4 ulp.
+    With |f| the distance to the center, the line's distance from it is known to 8 unit |f|: what that leaves of the root is
+    allowed, and 4 ulp.
     """
     first, second, away = balls.truth()
     reach = np.linalg.norm(balls.origin.astype(np.float64) - balls.center[:, None], axis=-1)
@@ -178,7 +179,7 @@ def floor_sphere(context: Context) -> Outcome:
         height = 10.0 ** rng.uniform(-1, 2, (packets, lanes))
         place = rng.uniform(-100, 100, (packets, lanes, 2))
         origin = np.stack([place[..., 0], height, place[..., 1]], -1).astype(real)
-        direction = rng.normal(size=origin.shape)
+        direction = np.asarray(rng.normal(size=origin.shape))
         direction[..., 1] = -np.abs(direction[..., 1]) - 0.05
         center, radius = np.tile((0.0, -1e6, 0.0), (packets, 1)), np.full(packets, 1e6)
         return Balls(center, radius, origin, _unit_rows(direction).astype(real))

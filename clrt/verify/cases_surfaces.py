@@ -41,9 +41,10 @@ def white_furnace(context: Context) -> Outcome:
     exact = [(view + white + m + ball, value) for m, value in lossless]
     exact += [(view + white + m + tilted, value) for m, value in lossless[:2]]
     mixed = _glass_sphere(0.25, 0.75, depth)
-    bounded = [(view + white + m + tilted, 1.0) for m in ("M 1 1 1 0 0 0 1 0 1 1.5\n", "M 1 1 1 0 0 0 1 0.25 0.75 1.5\n", "M 1 1 1 0 0 0 1 0.25 0.75 0.7\n")]
-    lit = _ahead(size, 35.0) + "L 1 2 -3\n"
-    bounded += [(lit + m + shape, 1.0) for m in ("M 1 1 1 0 1 0 1 0\n", "M 1 1 1 0 0 1 7 0\n", "M 1 1 1 0 0 1 0 0\n") for shape in (ball, tilted)]
+    glass_like = ("M 1 1 1 0 0 0 1 0 1 1.5\n", "M 1 1 1 0 0 0 1 0.25 0.75 1.5\n", "M 1 1 1 0 0 0 1 0.25 0.75 0.7\n")
+    bounded = [(view + white + m + tilted, 1.0) for m in glass_like]
+    lit, plain = _ahead(size, 35.0) + "L 1 2 -3\n", ("M 1 1 1 0 1 0 1 0\n", "M 1 1 1 0 0 1 7 0\n", "M 1 1 1 0 0 1 0 0\n")
+    bounded += [(lit + m + shape, 1.0) for m in plain for shape in (ball, tilted)]
     scenes = [(parse_scene(text), value, True) for text, value in exact] + [(parse_scene(text), value, False) for text, value in bounded]
     glass = parse_scene(view + white + "M 1 1 1 0 0 0 1 0.25 0.75 1.5\n" + ball)
 
@@ -150,9 +151,9 @@ def terminator(context: Context) -> Outcome:
     def wrong(rung: str) -> int:
         return sum(steps(context.render(s, rung)[size // 2, :, 0].astype(np.float64), light) for s, light in scenes)
 
-    angle = -np.arange(size) / size * np.pi
-    facet = np.floor(angle / 0.25) * 0.25 + 0.125
-    ball = np.maximum(np.cos(angle), 0)[::-1]
+    turn = -np.arange(size) / size * np.pi
+    facet = np.floor(turn / 0.25) * 0.25 + 0.125
+    ball = np.maximum(np.cos(turn), 0)[::-1]
     careless = np.where(np.cos(facet[::-1]) > 0, ball, 0)  # dark where the facet is
     naive = _steps(careless, ball, np.ones(size, bool))
     return Outcome(len(scenes) * size, context.each_rung(wrong), naive)

@@ -66,7 +66,9 @@ def camera(eye: FloatArray, view: FloatArray, fov: float, size: int, up: FloatAr
     return line("E", eye) + line("V", view, up) + line("F", fov) + f"R {size} {size}\n"
 
 
-def naive_hits(origins: FloatArray, directions: FloatArray, corners: FloatArray, epsilon: float, t_max: float = np.inf) -> NDArray[np.bool_]:
+def naive_hits(
+    origins: FloatArray, directions: FloatArray, corners: FloatArray, epsilon: float, t_max: float = np.inf
+) -> NDArray[np.bool_]:
     """(m,) whether rays meet a triangle for epsilon < t < t_max: Moeller and Trumbore in float32, no own primitive, no rebasing."""
     o, d, c = (np.asarray(a, np.float32) for a in (origins, directions, corners))
     e1, e2 = c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]
