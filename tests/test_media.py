@@ -63,7 +63,7 @@ def test_eye_knows_what_it_is_inside_of() -> None:
 
 
 def test_open_mesh_holds_no_eye() -> None:
-    assert _both(_scene(GLASS + "T -1 -1 -1 1 -1 -1 0 1 1\nT -1 -1 -1 1 -1 -1 0 0.2 3\n", "0 0 0.1"))[1] == []
+    assert _both(_scene(GLASS + "T -1 -1 -1 1 -1 -1 0 1 1\nT -1 -1 -1 1 -1 -1 0 0.2 3\n", "0 0 0.5"))[1] == []
 
 
 @pytest.mark.parametrize(

@@ -42,9 +42,9 @@ def _box(prims: Primitives, members: IndexArray) -> tuple[FloatArray, FloatArray
 
 
 def around(prims: Primitives, rank: IndexArray, point: FloatArray, tile_bytes: int) -> list[int]:
-    """Objects of glass around `point`, by rank: spheres it is inside of, meshes that every probe leaves through an odd number of walls."""
-    m = len(PROBES)
-    rays = Rays(np.tile(point, (m, 1)), PROBES, np.full(m, -1, np.int64), np.zeros(m), np.ones(m))
+    """Objects of glass around `point`, by rank: spheres it is inside of, meshes that all probes leave by an odd number of walls."""
+    m = 2 * len(PROBES)
+    rays = Rays(np.tile(point, (m, 1)), np.concatenate([PROBES, -PROBES]), np.full(m, -1, np.int64), np.zeros(m), np.ones(m))
     found = find_crossings(prims, rays, tile_bytes)
     odd = np.zeros((m, len(rank)), np.int64)
     walls = found.ahead & (found.prim < prims.triangle_count)

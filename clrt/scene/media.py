@@ -76,13 +76,13 @@ def around_eye(scene: Scene) -> list[int]:
 
 
 def _encloses(vertices: FloatArray, point: FloatArray) -> bool:
-    """Whether every probe from `point` crosses the triangles (n, 3, 3) an odd number of times."""
+    """Whether all probes from `point`, both ways, cross the triangles (n, 3, 3) an odd number of times."""
     corners = vertices - point
     for direction in _PROBES:
         edges = np.stack([np.cross(corners[:, i], corners[:, (i + 1) % 3]) @ direction for i in range(3)])
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         crossed = (edges > 0).all(0) | (edges < 0).all(0)
-        ahead = np.einsum("ni,ni->n", corners[:, 0], normal) * (normal @ direction) > 0
-        if not np.count_nonzero(crossed & ahead) % 2:
+        ahead = np.einsum("ni,ni->n", corners[:, 0], normal) * (normal @ direction)
+        if not all(np.count_nonzero(crossed & side) % 2 for side in (ahead > 0, ahead < 0)):
             return False
     return True
