@@ -20,7 +20,7 @@ def numbers(values: ArrayLike, name: str, error: type[ClrtError] = RayError) -> 
     Raises `error`, naming the argument, for all else: longdouble would lose digits, masked elements their mask, objects who knows what.
     """
     if isinstance(values, np.ma.MaskedArray):
-        masked = int(np.ma.count_masked(values))
+        masked = int(np.count_nonzero(np.ma.getmaskarray(values)))
         if masked:
             raise error(f"{name}: {masked} elements are masked; fill them (.filled) or leave their rows out")
         values = values.data

@@ -106,7 +106,7 @@ def _parts(mesh: Any) -> list[tuple[str, Any]]:
         raise MeshError("a trimesh.Scene has transforms of its own; give scene.to_mesh(), or a list of meshes")
     if isinstance(mesh, (list, tuple)) and len(mesh) and all(_is_one(part) for part in mesh):
         return [(f"mesh {number} of {len(mesh)}", part) for number, part in enumerate(mesh, 1)]
-    if isinstance(mesh, list) and len(mesh) == 2 and all(isinstance(part, np.ndarray) for part in mesh) and mesh[1].dtype.kind in "iu":
+    if isinstance(mesh, list) and len(mesh) == 2 and _is_pair_of_tables(mesh):
         raise MeshError("a list of two arrays is ambiguous; give vertices and faces as a tuple: (vertices, faces)")
     return [("mesh", mesh)]
 
@@ -117,22 +117,36 @@ def _faces_of(part: Any) -> Any:
 
 
 def _is_one(part: Any) -> bool:
-    """Whether this is a mesh by itself: an object of a mesh library, or a pair of tables."""
-    if hasattr(part, "vertices") and _faces_of(part) is not None:
-        return True
-    if not isinstance(part, (tuple, list)) or len(part) != 2:
-        return False
+    """Whether this is a mesh by itself: an object of a mesh library, or a pair of vertices and faces."""
+    return _is_object(part) or (isinstance(part, tuple) and len(part) == 2 and not any(_is_object(p) or _holds_tables(p) for p in part))
+
+
+def _holds_tables(part: Any) -> bool:
+    """Whether this is a pair that begins with a table, and not a table of two rows."""
     try:
-        return all(np.ndim(table) == 2 for table in part)
+        return isinstance(part, tuple) and len(part) == 2 and np.ndim(part[0]) == 2
     except ValueError:  # ragged
         return False
 
 
+def _is_object(part: Any) -> bool:
+    return hasattr(part, "vertices") and _faces_of(part) is not None
+
+
+def _is_pair_of_tables(tables: list[Any]) -> bool:
+    """Whether these look like vertices and faces: unlike two triangles, of unequal length or type."""
+    try:
+        points, index = (np.asarray(table) for table in tables)
+    except (ValueError, TypeError):
+        return False
+    return points.ndim == index.ndim == 2 and (points.shape != index.shape or (points.dtype.kind == "f" and index.dtype.kind in "iu"))
+
+
 def _corners(part: Any, name: str) -> FloatArray:
     """(m, 3, 3) float64 of one mesh. Raises MeshError."""
-    if hasattr(part, "vertices") and _faces_of(part) is not None:
+    if _is_object(part):
         return _indexed(part.vertices, _faces_of(part), name)
-    if (isinstance(part, tuple) and len(part) == 2) or _is_one(part):
+    if _is_one(part):
         return _indexed(part[0], part[1], name)
     triangles = numbers(part, f"{name}: expected {_FORMS}; as triangles", MeshError)
     if triangles.shape == (0,):

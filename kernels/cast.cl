@@ -175,6 +175,16 @@ kernel void cast_finish(global const double *vertices, global const HitSource *s
     global const double *d = (rays->given + rays->first + lane)->direction;
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 //@end
+//@hook tie
+    // Of equal t the lowest id comes first, so that counting, which goes on from it, leaves none out.
+    const mask_n tied = hit & is_equal(t, hits->t) & is_at_least(hits->slot, NO_LANES);
+    if (any_lane(tied)) {
+        lane_int best[LANES], lower[LANES];
+        store_lanes(hits->slot, best);
+        for (int k = 0; k < LANES; k++) lower[k] = best[k] >= 0 && geometry->surfaces[slot].prim < geometry->surfaces[best[k]].prim ? -1 : 0;
+        closer |= tied & load_lanes(lower);
+    }
+//@end
 //@hook accept
     if (any_lane(hit & is_at_least(rays->after, NO_LANES))) {
         lane_int last[LANES], later[LANES];
