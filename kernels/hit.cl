@@ -1,4 +1,4 @@
-// Provides: Hit: what shading needs to know of the nearest hit of each ray; gather, normalize_n, face_towards, hit_outside.
+// Provides: Hit: what shading needs to know of the nearest hit of each ray; gather, normalize_n, face_towards.
 // Needs: lanes.cl, rays.cl.  Reads: nothing.
 
 // Lane-wise reads: `expression` may use the lane number k.
@@ -17,6 +17,7 @@ typedef struct {
     mask_n found;
     lane_int slot[LANES];      // what was hit; 0 in lanes that hit nothing
     lane_int material[LANES];
+    //@ hit_members
 } Hit;
 
 HOT void normalize_n(real_n *a) {
@@ -29,6 +30,3 @@ HOT void face_towards(real_n *a, const real_n *b, const int away) {
     const mask_n flip = away ? is_greater(dot_n(a, b), (real_n)0) : is_less(dot_n(a, b), (real_n)0);
     for (int i = 0; i < 3; i++) a[i] = choose(flip, -a[i], a[i]);
 }
-
-// The hit point moved towards the viewer by `distance`, far enough that no rounding puts it behind.
-HOT real_n hit_outside(const Hit *hit, real_n distance, int axis) { return multiply_add(hit->geometric[axis], distance, hit->point[axis]); }

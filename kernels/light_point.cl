@@ -17,7 +17,9 @@ HOT void direct_light(const Geometry *geometry, global const Light *lights, int 
         const real_n cos_light = dot_n(hit->normal, to_light), cos_view = dot_n(hit->normal, rays->direction);
         // R.V with R = 2 (N.L) N - L and V = -direction.
         const real_n cos_reflected = dot_n(to_light, rays->direction) - R(2.0) * cos_light * cos_view;
-        mask_n lit = hit->found & is_greater(cos_light, (real_n)0) & is_greater(dot_n(hit->geometric, to_light), (real_n)0);
+        mask_n above = is_greater(dot_n(hit->geometric, to_light), (real_n)0);
+        //@ light_above
+        mask_n lit = hit->found & above & is_greater(cos_light, (real_n)0);
         const mask_n shiny = lit & is_greater(cos_reflected, (real_n)0) & is_greater(specular, (real_n)0);
         real_n amount = diffuse * cos_light;
         if (any_lane(shiny)) amount += choose(shiny, specular * pow(choose(shiny, cos_reflected, (real_n)1), exponent), (real_n)0);

@@ -7,16 +7,18 @@ HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int i
     Geometry seen = *geometry;
     seen.planes = geometry->light_planes + (size_t)index * geometry->slot_count;
     Rays rays;
-    real_n span[3], offset = 0;
+    real_n end[3], span[3], offset = 0;
     for (int a = 0; a < 3; a++) {
         seen.shared_origin[a] = light->given[a];
-        span[a] = hit->point[a] - light->position[a];
+        end[a] = hit->point[a];
+        //@ shadow_end
+        span[a] = end[a] - light->position[a];
         offset += abs_n(span[a]) + abs_n((real_n)light->position[a]);
     }
     offset *= R(8.0) * UNIT_ROUNDOFF;
     for (int a = 0; a < 3; a++) {
         rays.origin[a] = (real_n)light->position[a];
-        span[a] = hit_outside(hit, hit->error + offset, a) - light->position[a];
+        span[a] = multiply_add(hit->geometric[a], hit->error + offset, end[a]) - light->position[a];
     }
     const real_n length = sqrt(dot_n(span, span));
     for (int a = 0; a < 3; a++) rays.direction[a] = span[a] / length;
@@ -24,6 +26,7 @@ HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int i
     rays.t_max = length;
     rays.active = lit;
     rays.skip = load_lanes(hit->slot);
+    //@ shadow_skip
     rays_prepare(&rays, R(0.0));
     Hits hits;
     hits.t = length;

@@ -23,4 +23,5 @@ HOT void hit_surface(const Geometry *geometry, global const Frame *frame, global
     //@ hit_surface
     face_towards(hit->geometric, rays->direction, 1);
     face_towards(hit->normal, hit->geometric, 0);
+    //@ hit_faced
 }

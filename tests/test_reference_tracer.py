@@ -83,12 +83,23 @@ def test_smooth_normal_is_the_weighted_mean_of_the_corners():
     s = scene([mesh(triangle, corner_normals=corner)], [matte()], [(0.5, 0.25, -1e9)], eye=(0.5, 0.25, -1))
     n = 0.25 * corner[0, 0] + 0.5 * corner[0, 1] + 0.25 * corner[0, 2]
     assert render(s).pixels[0, 0, 0] == pytest.approx(-n[2] / np.linalg.norm(n), rel=1e-9)
-    # Turned normals are brought to the viewer's side; the light must be on the geometric side, too.
+    # Turned normals are brought to the viewer's side.
     turned = scene([mesh(triangle, corner_normals=-corner)], [matte()], [(0.5, 0.25, -1e9)], eye=(0.5, 0.25, -1))
     np.testing.assert_allclose(render(turned).pixels, render(s).pixels, rtol=1e-14)
-    grazing = scene([mesh(triangle, corner_normals=corner)], [matte()], [(1e9, 0, 1e6)], eye=(0.5, 0.25, -1))
-    assert n[0] > 0.0
-    assert render(grazing).pixels[0, 0, 0] == 0.0
+
+
+@pytest.mark.parametrize("bulge", [1.0, -1.0])
+def test_light_behind_the_plane_of_a_curved_triangle_reaches_it_where_it_bulges(bulge):
+    """At (0.5, 0.25, 0) the normal is (0.3, 0.2, -0.8) and the shadow ray leaves 0.21 above the face, at (0.59, 0.37, -0.21).
+
+    Towards (1, 0, 0.3) it comes down to the plane at x = 1.29, beyond the triangle. A hollow triangle, its normals the other way, has the
+    same cosine towards (-1, 0, 0.3), but no lift: its face is between.
+    """
+    corner = np.array([[[0, 0, -1.0], [0.6 * bulge, 0, -0.8], [0, 0.8 * bulge, -0.6]]])
+    point, way = np.array([0.5, 0.25, 0.0]), np.array([bulge, 0.0, 0.3])
+    s = scene([mesh([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], corner_normals=corner)], [matte()], [point + 1e6 * way], eye=(0.5, 0.25, -1))
+    cosine = (0.3 - 0.24) / np.sqrt(0.77 * 1.09)
+    assert render(s).pixels[0, 0, 0] == pytest.approx(cosine if bulge > 0.0 else 0.0, rel=1e-6)
 
 
 def test_shadow_of_a_sphere_is_the_disc_of_the_tangent_cone():

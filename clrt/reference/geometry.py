@@ -49,6 +49,7 @@ class Primitives:
     centers : (k, 3); radii : (k,)
     material : (n + k,); object_id : (n + k,) what the stack of dielectrics holds: mesh objects first, then spheres
     curvature : (n + k,) 1 / length: how fast the shading normal turns along the surface (0: flat)
+    curved : (n + k,) bool, a triangle whose corners' normals are not all the face's own
     largest : no coordinate of a triangle or of the eye is greater
     """
 
@@ -60,6 +61,7 @@ class Primitives:
     material: IndexArray
     object_id: IndexArray
     curvature: FloatArray
+    curved: BoolArray
     largest: float
     edges: EdgeTable
 
@@ -77,13 +79,15 @@ class Primitives:
         vertices = np.concatenate([empty, *(o.vertices for o in objects)])
         corner = np.concatenate([empty, *(np.repeat(o.normals[:, None], 3, axis=1) if o.vertex_normals is None else o.vertex_normals
                                           for o in objects)])  # fmt: skip
+        own = np.concatenate([np.zeros((0, 3)), *(o.normals for o in objects)])
         spheres = scene.spheres
+        curved = np.concatenate([(corner != own[:, None]).any(axis=(1, 2)), np.zeros(len(spheres), np.bool_)])
         material = np.concatenate([*(o.material_ids for o in objects), spheres.material_ids]).astype(np.int64)
         object_id = np.concatenate([*(np.full(len(o), ids[id(o)]) for o in objects), len(objects) + np.arange(len(spheres))])
         largest = float(np.abs(np.concatenate([vertices.reshape(-1, 3), scene.camera.eye[None]])).max())
         curvature = np.concatenate([_curvature(vertices, corner), 1.0 / spheres.radii])
         return cls(vertices, _face_normals(vertices), corner, spheres.centers, spheres.radii, material, object_id.astype(np.int64),
-                   curvature, largest, EdgeTable.build(vertices, largest))  # fmt: skip
+                   curvature, curved, largest, EdgeTable.build(vertices, largest))  # fmt: skip
 
     @property
     def triangle_count(self) -> int:

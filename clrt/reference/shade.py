@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from clrt.reference.crossings import Rays
 from clrt.reference.geometry import MaterialTable, Primitives
+from clrt.reference.terminator import face_between, lifts
 from clrt.reference.visibility import occluded
 from clrt.scene.model import PointLight
 
@@ -28,6 +29,8 @@ class Surface:
     curvature : (m,) 1 / length; dir_err : (m,) of the arriving ray; errors of the hit: across the ray spread_err (m,), along the
         surface pos_err (m,), greater where the ray is slanted
     margin : (m,) how far the choice of sides is from another
+    curved : (m,) bool, on a curved triangle; lift : (m, 3) from the point to where shadow rays leave, 0 elsewhere; lift_err : (m,)
+        error of point + lift
     """
 
     point: FloatArray
@@ -41,6 +44,9 @@ class Surface:
     pos_err: FloatArray
     dir_err: FloatArray
     margin: FloatArray
+    curved: NDArray[np.bool_]
+    lift: FloatArray
+    lift_err: FloatArray
 
     @property
     def normal_err(self) -> FloatArray:
@@ -61,7 +67,8 @@ def surfaces(prims: Primitives, rays: Rays, prim: IndexArray, t: FloatArray) -> 
     n_geo, n_shade = np.empty_like(point), np.empty_like(point)
     mesh = prim < prims.triangle_count
     n_geo[mesh] = prims.n_geo[prim[mesh]]
-    n_shade[mesh] = _interpolated(prims, prim[mesh], rays.origin[mesh], rays.direction[mesh])
+    weights = _weights(prims, prim[mesh], rays.origin[mesh], rays.direction[mesh])
+    n_shade[mesh] = _interpolated(prims, prim[mesh], weights)
     sphere = prim[~mesh] - prims.triangle_count
     n_geo[~mesh] = (point[~mesh] - prims.centers[sphere]) / prims.radii[sphere][:, None]
     n_shade[~mesh] = n_geo[~mesh] = n_geo[~mesh] / np.linalg.norm(n_geo[~mesh], axis=1, keepdims=True)
@@ -72,18 +79,29 @@ def surfaces(prims: Primitives, rays: Rays, prim: IndexArray, t: FloatArray) -> 
     spread = rays.pos_err + t * rays.speed * rays.dir_err
     pos_err = spread / np.maximum(-dot(n_geo, unit), STEEPEST)
     margin = np.where(curvature > 0.0, np.abs(agreement) / (1.0 + curvature * pos_err), np.inf)
-    return Surface(point, prim, prims.material[prim], -unit, n_geo, n_shade, curvature, spread, pos_err, rays.dir_err, margin)
+    curved, lift, lift_err = prims.curved[prim], np.zeros_like(point), pos_err.copy()
+    rows, tri = np.flatnonzero(curved), prim[curved]
+    turned = np.where(agreement[rows] < 0.0, -1.0, 1.0)[:, None, None] * prims.corner_normals[tri]
+    lift[rows], growth = lifts(prims.vertices[tri], turned, weights[curved[mesh]], point[rows], n_geo[rows])
+    lift_err[rows] *= growth
+    return Surface(point, prim, prims.material[prim], -unit, n_geo, n_shade, curvature, spread, pos_err, rays.dir_err, margin,
+                   curved, lift, lift_err)  # fmt: skip
 
 
-def _interpolated(prims: Primitives, tri: IndexArray, origin: FloatArray, direction: FloatArray) -> FloatArray:
-    """Unit normals (1 - u - v) n0 + u n1 + v n2; u, v weights of corners 1 and 2, in proportion to the volumes d . (C x A), d . (A x B)."""
+def _weights(prims: Primitives, tri: IndexArray, origin: FloatArray, direction: FloatArray) -> FloatArray:
+    """(m, 3) barycentric weights, in proportion to the volumes d . (B x C), d . (C x A), d . (A x B)."""
     to = prims.vertices[tri] - origin[:, None]
     weights = np.einsum("mi,mci->mc", direction, np.cross(to[:, [1, 2, 0]], to[:, [2, 0, 1]]))
+    total = weights.sum(axis=1, keepdims=True)
+    result: FloatArray = np.divide(weights, total, where=total != 0.0, out=np.full_like(weights, 1.0 / 3.0))
+    return result
+
+
+def _interpolated(prims: Primitives, tri: IndexArray, weights: FloatArray) -> FloatArray:
+    """Unit normals: the sums of the corners' by `weights` (m, 3)."""
     normals = prims.corner_normals[tri]
     # A face's own normal stays as it is given: interpolation would round it.
     flat = prims.curvature[tri] == 0.0
-    total = weights.sum(axis=1, keepdims=True)
-    weights = np.divide(weights, total, where=total != 0.0, out=np.full_like(weights, 1.0 / 3.0))
     mixed = np.where(flat[:, None], normals[:, 0], np.einsum("mc,mci->mi", weights, normals))
     length = np.linalg.norm(mixed, axis=1, keepdims=True)
     result: FloatArray = np.divide(mixed, length, where=length > 0.0, out=prims.n_geo[tri].copy())
@@ -108,7 +126,7 @@ def local_color(
         margin = np.minimum(margin, close)
         traced = np.flatnonzero(lit & (shine != 0.0) & (power != 0.0).any(axis=1) & (weight != 0.0))
         shadow_rays += len(traced)
-        blocked, closeness = occluded(prims, _segments(surface, traced, np.array(light.position)), tile_bytes)
+        blocked, closeness = _hidden(prims, surface, traced, np.array(light.position), tile_bytes)
         counts = np.abs(shine * power.max(axis=1, initial=0.0) * weight)[traced] > NO_CONSEQUENCE
         margin[traced] = np.where(counts, np.minimum(margin[traced], closeness), margin[traced])
         visible = traced[~blocked]
@@ -116,10 +134,30 @@ def local_color(
     return materials.color[ids] * total, margin, shadow_rays
 
 
-def _segments(surface: Surface, rows: IndexArray, position: FloatArray) -> Rays:
-    """From the hits to the light. The far end is exact: the direction adds no error but its own rounding."""
-    origin = surface.point[rows]
-    return Rays(origin, position - origin, surface.prim[rows], surface.pos_err[rows], np.ones(len(rows)))
+def _hidden(
+    prims: Primitives, surface: Surface, rows: IndexArray, position: FloatArray, tile_bytes: int
+) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Whether the light at `position` is hidden from the hits `rows`, (k,), and the margin (k,).
+
+    Segments run from the lifted hits to the light. The far end is exact: the direction adds no error but its own rounding.
+    """
+    origin = surface.point[rows] + surface.lift[rows]
+    hidden, margin = np.zeros(len(rows), np.bool_), np.zeros(len(rows))
+    apart = np.flatnonzero((origin != position).any(axis=1))
+    rows, origin = rows[apart], origin[apart]
+    segments = Rays(origin, position - origin, surface.prim[rows], surface.lift_err[rows], np.ones(len(rows)))
+    by_others, others = occluded(prims, segments, tile_bytes)
+    by_face, face = np.zeros(len(rows), np.bool_), np.full(len(rows), np.inf)
+    at, tri = np.flatnonzero(surface.curved[rows]), surface.prim[rows[surface.curved[rows]]]
+    curved = rows[at]
+    by_face[at], face[at] = face_between(
+        prims.vertices[tri], surface.n_geo[curved], surface.point[curved], surface.lift[curved], position, surface.lift_err[curved]
+    )
+    hidden[apart] = by_others | by_face
+    # The firmer of two that block decides; where neither does, the one that is nearer to it.
+    firmer = np.maximum(np.where(by_others, others, 0.0), np.where(by_face, face, 0.0))
+    margin[apart] = np.where(hidden[apart], firmer, np.minimum(others, face))
+    return hidden, margin
 
 
 def _light_term(
@@ -134,12 +172,14 @@ def _light_term(
     r_v = 2.0 * n_l * dot(surface.n_shade, surface.view) - dot(unit, surface.view)
     gloss = np.where(r_v > 0.0, np.power(np.maximum(r_v, 0.0), materials.exponent[ids]), 0.0) * materials.specular[ids]
     shine = materials.diffuse[ids] * np.maximum(n_l, 0.0) + gloss
-    lit = (n_l > 0.0) & (g_l > 0.0)
-    # At N.L = 0 only the specular term jumps; at n_geo.L = 0 also the diffuse one, as far as the two normals differ.
+    above = (g_l > 0.0) | surface.curved
+    lit = (n_l > 0.0) & above
+    # At N.L = 0 only the specular term jumps; at n_geo.L = 0, unless curved, also the diffuse one, as far as the two normals differ.
     at_geo = gloss + materials.diffuse[ids] * np.maximum(n_l - g_l, 0.0)
     moved = np.divide(surface.pos_err, distance, where=distance > 0.0, out=np.full_like(distance, np.inf))
     by_shade, by_geo = np.abs(n_l) / (1.0 + moved + surface.curvature * surface.pos_err), np.abs(g_l) / (1.0 + moved)
-    jump_shade, jump_geo = np.abs(gloss) * scale > NO_CONSEQUENCE, np.abs(at_geo) * scale > NO_CONSEQUENCE
+    jump_shade = np.abs(gloss) * scale > NO_CONSEQUENCE
+    jump_geo = (np.abs(at_geo) * scale > NO_CONSEQUENCE) & ~surface.curved
     leave = np.minimum(np.where(jump_shade, by_shade, np.inf), np.where(jump_geo, by_geo, np.inf))
-    enter = np.maximum(np.where(n_l > 0.0, 0.0, by_shade), np.where(g_l > 0.0, 0.0, by_geo))
-    return shine, lit, np.where(lit, leave, np.where(jump_geo, enter, np.inf))
+    enter = np.maximum(np.where(n_l > 0.0, 0.0, by_shade), np.where(above, 0.0, by_geo))
+    return shine, lit, np.where(lit, leave, np.where(np.where(surface.curved, jump_shade, jump_geo), enter, np.inf))
