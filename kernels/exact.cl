@@ -27,18 +27,27 @@ static inline void triple_double(const double *d, const double *p, const double 
     *error = DOUBLE_BOUND * size + UNDERFLOW;
 }
 
-static inline void plane_double(const Geometry *geometry, const double *origin, const double *direction, int slot, Plane *plane) {
+// rate and offset alone.
+static inline void plane_distance_double(const Geometry *geometry, const double *origin, const double *direction, int slot, Plane *plane) {
     global const double *v = geometry->vertices + 9 * (size_t)slot;
-    double corner[3][3], e1[3], e2[3];
+    double corner[3], e1[3], e2[3];
     for (int a = 0; a < 3; a++) {
-        for (int c = 0; c < 3; c++) corner[c][a] = v[3 * c + a] - origin[a];
+        corner[a] = v[a] - origin[a];
         e1[a] = v[3 + a] - v[a];
         e2[a] = v[6 + a] - v[a];
     }
+    triple_double(direction, e1, e2, &plane->rate, &plane->rate_error);
+    triple_double(corner, e1, e2, &plane->offset, &plane->offset_error);
+}
+
+static inline void plane_double(const Geometry *geometry, const double *origin, const double *direction, int slot, Plane *plane) {
+    global const double *v = geometry->vertices + 9 * (size_t)slot;
+    double corner[3][3];
+    for (int a = 0; a < 3; a++)
+        for (int c = 0; c < 3; c++) corner[c][a] = v[3 * c + a] - origin[a];
     for (int c = 0; c < 3; c++)
         triple_double(direction, corner[(c + 1) % 3], corner[(c + 2) % 3], plane->edge + c, plane->edge_error + c);
-    triple_double(direction, e1, e2, &plane->rate, &plane->rate_error);
-    triple_double(corner[0], e1, e2, &plane->offset, &plane->offset_error);
+    plane_distance_double(geometry, origin, direction, slot, plane);
 }
 
 // The same numbers without error, made only where float64 cannot decide.
@@ -111,7 +120,7 @@ static inline int exact_after(const Geometry *geometry, const double *origin, co
 static inline int exact_nearer(const Geometry *geometry, const double *origin, const double *direction, int slot, const Plane *plane, int other,
                         int *stage) {
     Plane q;
-    plane_double(geometry, origin, direction, other, &q);
+    plane_distance_double(geometry, origin, direction, other, &q);
     const double left = plane->offset * q.rate, right = q.offset * plane->rate;
     const double error = plane->offset_error * fabs(q.rate) + fabs(plane->offset) * q.rate_error + plane->offset_error * q.rate_error +
                          q.offset_error * fabs(plane->rate) + fabs(q.offset) * plane->rate_error + q.offset_error * plane->rate_error;

@@ -24,6 +24,7 @@ typedef struct {
 // Fills what follows from origin and direction; lanes with a NaN or an infinity become inactive: they hit nothing.
 // `corner_extent` bounds the coordinates of the corners that distances are computed from in `real`; 0 for rays of a shared origin.
 HOT void rays_prepare(Rays *rays, real corner_extent) {
+    //@ rays_begin
     rays->octant = NO_LANES;
     rays->scale = abs_n(rays->origin[0]) + abs_n(rays->origin[1]) + abs_n(rays->origin[2]) + (real_n)corner_extent;
     for (int a = 0; a < 3; a++) {

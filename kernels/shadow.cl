@@ -16,9 +16,11 @@ HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int i
         offset += abs_n(span[a]) + abs_n((real_n)light->position[a]);
     }
     offset *= R(8.0) * UNIT_ROUNDOFF;
+    real_n above = hit->error + offset;
+    //@ shadow_above
     for (int a = 0; a < 3; a++) {
         rays.origin[a] = (real_n)light->position[a];
-        span[a] = multiply_add(hit->geometric[a], hit->error + offset, end[a]) - light->position[a];
+        span[a] = multiply_add(hit->geometric[a], above, end[a]) - light->position[a];
     }
     const real_n length = sqrt(dot_n(span, span));
     for (int a = 0; a < 3; a++) rays.direction[a] = span[a] / length;
@@ -32,6 +34,7 @@ HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int i
     hits.t = length;
     hits.slot = (mask_n)-1;
     //@ hits_begin
+    //@ shadow_limit
     scene_trace(&seen, &rays, SHADOW_SHARED_ORIGIN, 1, &hits);
     //@counting count_rays(geometry->counters, COUNT_SHADOW, rays.active);
     return lit & is_less(hits.slot, NO_LANES);

@@ -2,7 +2,7 @@
 // Needs: hit.cl, rays.cl, geometry.cl, structs.  Reads: nothing.
 
 // The error of a hit point along its normal n, with t = T / (n.d) of triangle.cl:
-//   n.d is off by (1 + 3)u |n||d|, T by u (shared origin) and the quotient by u: t |n.d| / |n| is off by at most 6u t;
+//   n.d is off by (1 + 3)u |n||d|, T by u (shared origin) and the quotient by 2u: t |n.d| / |n| is off by at most 7u t;
 //   other rays have T = n.(v0 - o) off by u |v0| + 5u |v0 - o| more; the shared origin itself is rounded by u |o|;
 //   o + t d is rounded by u (|o| + t).
 // Together below 8u (scale + t), with scale as rays.cl has it.
@@ -10,7 +10,8 @@ HOT void hit_surface(const Geometry *geometry, global const Frame *frame, global
                         const Hits *hits, Hit *hit) {
     hit->found = is_at_least(hits->slot, NO_LANES);
     store_lanes(choose(hit->found, hits->slot, NO_LANES), hit->slot);
-    const real_n t = choose(hit->found, hits->t, (real_n)0);
+    real_n t = choose(hit->found, hits->t, (real_n)0);
+    //@ hit_distance
     for (int a = 0; a < 3; a++) hit->point[a] = ray_point(rays, t, a);
     hit->error = (R(8.0) * UNIT_ROUNDOFF) * (rays->scale + t);
     lane_int record[LANES];

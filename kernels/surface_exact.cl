@@ -19,7 +19,7 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
         ray_given(geometry, rays, k, shared_origin, origin, direction, &t_min, &t_max);
         global const double *v = geometry->vertices + 9 * (size_t)hit->slot[k];
         Plane plane;
-        plane_double(geometry, origin, direction, (int)hit->slot[k], &plane);
+        plane_distance_double(geometry, origin, direction, (int)hit->slot[k], &plane);
         const double t = plane.offset / plane.rate;
         for (int a = 0; a < 3; a++) {
             e1[a] = v[3 + a] - v[a];
@@ -46,4 +46,18 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
     refine_points(&seen, &copy, from->from_eye, hit, active, refined, &refined_error);
     for (int a = 0; a < 3; a++) start[a] = refined[a];
     error = refined_error;
+//@end
+//@hook shadow_above
+    // A ray that ends on a flat triangle ends at its plane, compared exactly: no offset hides what touches it.
+    mask_n planar = is_less(load_lanes(hit->slot), (mask_n)geometry->slot_count);
+    for (int a = 0; a < 3; a++) planar &= is_equal(end[a], hit->point[a]);
+    above = choose(planar, (real_n)0, above);
+//@end
+//@hook shadow_limit
+    // The plane lies at the ray's length to within the point's error and the ray's own, which is half of `offset`.
+    planar &= is_at_least(rays.skip, NO_LANES);
+    const real_n slack = R(1.01) * (hit->error + R(0.5) * offset) / abs_n(dot_n(hit->geometric, rays.direction));
+    rays.limit = choose(planar, rays.skip, (mask_n)-1);
+    hits.t = choose(planar, length + slack, hits.t);
+    hits.low = choose(planar, length - slack, hits.low);
 //@end

@@ -43,7 +43,7 @@ HOT EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, rea
 
 // The distance to the triangle's plane, t = offset / rate with offset = n.(v0 - o), rate = n.d.
 //   rate is off by (1 + 3)u |n||d|, offset by u of itself (shared origin, from float64) or by 8u reach |n| (rounded origin and corner,
-//   difference, dot product), the quotient by u. Rates below 2 (8u |n|) are grazing; above, the true rate is more than half of
+//   difference, dot product), the quotient by 2u. Rates below 2 (8u |n|) are grazing; above, the true rate is more than half of
 //   the computed one, and with |rate| <= |n||d|, t is off by less than (2 |t|) (8u |n|) / |rate|, or
 //   2 (|t| + reach) (8u |n|) / |rate|; normal_bound is 8u |n|.
 typedef struct {
@@ -67,8 +67,9 @@ HOT PlaneHit plane_hit(const Geometry *geometry, const Rays *rays, real_n reach,
         inherited = reach;
     }
     PlaneHit hit;
-    hit.t = offset / rate;
-    hit.error = R(2.0) * (abs_n(hit.t) + inherited) * abs_n(normal_bound / rate);
+    const real_n inverse = R(1.0) / rate;
+    hit.t = offset * inverse;
+    hit.error = (abs_n(hit.t) + inherited) * abs_n(R(2.0) * normal_bound * inverse);
     hit.grazing = is_at_most(abs_n(rate), R(2.0) * normal_bound);
     return hit;
 }

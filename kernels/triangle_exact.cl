@@ -8,10 +8,11 @@
 // The lanes in `unsure`, one by one, by the numbers as given: those that hit nearer than what they have; their t.
 static __attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n unsure,
                                                  const Hits *hits, real_n *distance) {
-    lane_int test[LANES], best[LANES];
+    lane_int test[LANES], best[LANES], limit[LANES];
     real t[LANES];
     store_lanes(unsure, test);
     store_lanes(hits->slot, best);
+    store_lanes(rays->limit, limit);
     store_lanes(*distance, t);
     int decided_double = 0, decided_exact = 0;
     for (int k = 0; k < LANES; k++) {
@@ -23,7 +24,8 @@ static __attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry
         plane_double(geometry, origin, direction, slot, &plane);
         int hit = exact_inside(geometry, origin, direction, slot, &plane, &stage);
         hit = hit && exact_after(geometry, origin, direction, slot, &plane, t_min, &stage) > 0;
-        hit = hit && exact_after(geometry, origin, direction, slot, &plane, t_max, &stage) < 0;
+        if (limit[k] >= 0) hit = hit && exact_nearer(geometry, origin, direction, slot, &plane, limit[k], &stage) < 0;
+        else hit = hit && exact_after(geometry, origin, direction, slot, &plane, t_max, &stage) < 0;
         //@ exact_accept
         if (hit && best[k] >= 0) {
             const int order = exact_nearer(geometry, origin, direction, slot, &plane, best[k], &stage);
@@ -89,6 +91,12 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
 //@end
 //@hook begin
     geometry.decided = decided;
+//@end
+//@hook rays_members
+    mask_n limit;                        // the slot of a triangle whose plane ends the ray, instead of t_max; or -1
+//@end
+//@hook rays_begin
+    rays->limit = (mask_n)-1;
 //@end
 //@hook hits_members
     real_n low;                          // t is at least this
