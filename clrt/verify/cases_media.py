@@ -186,7 +186,8 @@ def _slab(lo: float, hi: float, half: float) -> str:
 
 def _view(size: int, fov: float, z: float = 0.0) -> str:
     eye, up = np.array((0.013, 0.007, z)), np.array((0.0, 1.0, 0.0))
-    return camera(eye, np.array((0.0, 0.0, 1.0)), fov, size, up)
+    view = np.array((0.0, 0.0, 1.0))
+    return camera(eye, view, fov, size, up) + pictures.company(eye, view)
 
 
 def _seen(scene: Scene, layers: list[tuple[float, float]], first: float, wall: float) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -231,15 +232,13 @@ def nested(context: Context) -> Outcome:
     layers = [(1.0, 1.0), (0.2, 1.5), (0.3, 1.33), (0.7, 1.0), (0.4, 1.33), (0.4, 1.5), (0.2, 1.0)]
     scenes, naive = [], []
     for order in ((1.5, 1.33, 1.0), (1.0, 1.33, 1.5), (1.33, 1.5, 1.0)):
-        text = _view(64, 22.0) + "depth 8\n" + _cards(3.2) + "".join(_glass(index) + _slab(*boxes[index]) for index in order)
+        text = _view(64, 22.0) + _cards(3.2) + "".join(_glass(index) + _slab(*boxes[index]) for index in order)
         scene = parse_scene(text)
         scenes.append((scene, *_seen(scene, layers, 1.0, 1.0)))
         naive.append(_seen(scene, [(1.2, 1.0), (1.8, 1.5), (0.2, 1.0)], 1.0, 1.0)[0])  # the outermost index alone
     overlapping = {1.7: (1.0, 2.2, 40.0), 1.3: (1.8, 3.0, 40.0)}
     for first, second in ((1.7, 1.3), (1.3, 1.7)):  # the second has the say between 1.8 and 2.2
-        text = (
-            _view(64, 22.0) + "depth 8\n" + _cards(3.2) + "".join(_glass(index) + _slab(*overlapping[index]) for index in (first, second))
-        )
+        text = _view(64, 22.0) + _cards(3.2) + "".join(_glass(index) + _slab(*overlapping[index]) for index in (first, second))
         scene = parse_scene(text)
         middle = [(0.8, 1.7), (1.2, 1.3)] if second == 1.3 else [(1.2, 1.7), (0.8, 1.3)]
         scenes.append((scene, *_seen(scene, [(1.0, 1.0), *middle, (0.2, 1.0)], 1.0, 1.0)))
@@ -255,7 +254,7 @@ def camera_inside(context: Context) -> Outcome:
         (_glass(1.5) + _slab(-1.0, 0.5, 40.0), [(0.5, 1.5), (0.3, 1.0)], 1.5),
         (_glass(1.5) + _slab(-1.0, 0.5, 40.0) + _glass(1.33) + _slab(-0.5, 0.2, 39.0), [(0.2, 1.33), (0.3, 1.5), (0.3, 1.0)], 1.33),
     ):
-        scene = parse_scene(_view(64, 100.0) + "depth 3\n" + _cards(0.8) + text)
+        scene = parse_scene(_view(64, 100.0) + _cards(0.8) + text)
         scenes.append((scene, *_seen(scene, layers, first, 1.0)))
         naive.append(_seen(scene, layers, 1.0, 1.0)[0])  # the eye taken to be in air
     scenes = [(s, e, sure & ~(e == 0).all(-1)) for s, e, sure in scenes]
@@ -274,7 +273,7 @@ def coincident(context: Context) -> Outcome:
     layers = [(1.0, 1.0), (0.2, 1.5), (0.5, 1.33), (0.3, 1.5), (0.2, 1.0)]
     scenes, naive = [], []
     for text in (_glass(1.5) + shell + _glass(1.33) + water, _glass(1.33) + water + _glass(1.5) + shell):
-        scene = parse_scene(_view(64, 32.0) + "depth 8\n" + _cards(2.2) + text)
+        scene = parse_scene(_view(64, 32.0) + _cards(2.2) + text)
         scenes.append((scene, *_seen(scene, layers, 1.0, 1.0)))
         naive.append(_seen(scene, [(1.0, 1.0), (0.2, 1.5), (0.5, 1.0), (0.3, 1.5), (0.2, 1.0)], 1.0, 1.0)[0])  # the second wall lost
     return _judge(context, scenes, naive)
@@ -289,7 +288,7 @@ def many_reflections(context: Context) -> Outcome:
     """Along a square rod of glass: what is left after the reflections on each pixel's way, counted by unfolding the rod: within 1e-4."""
     half, size = 0.025, 32
     rod = pictures.triangles(pictures.box((-half, -half, 0.5), (half, half, 6.0))) + "O\n"
-    text = _view(size, 100.0, 0.499) + f"depth 64\nM 1 1 1 0 0 0 1 0 {KEPT!r} 1.6\n" + rod
+    text = _view(size, 100.0, 0.499) + f"M 1 1 1 0 0 0 1 0 {KEPT!r} 1.6\n" + rod
     text += (
         "M 1 1 1 1 0 0 1 0\n"
         + pictures.triangles(pictures.quads(np.array([[(-1, -1, 6.1), (1, -1, 6.1), (1, 1, 6.1), (-1, 1, 6.1)]])))

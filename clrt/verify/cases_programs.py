@@ -7,7 +7,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +125,7 @@ def unsafe_options(context: Context) -> Outcome:
 def _busy_scene(size: int = 64) -> Scene:
     """Every effect but smooth normals in one picture."""
     text = pictures.camera(np.array((0.0, 0.5, -3.0)), np.array((0.0, -0.1, 1.0)), 50.0, size, np.array((0.0, 1.0, 0.0)))
-    text += "L 3 4 -4\nL -2 3 0 0.5 0.4 0.3\nbackground 0.2 0.3 0.5\nM 0.9 0.8 0.7 0.1 0.7 0.4 30 0.3\n"
+    text += f"depth {pictures.DEPTH}\nL 3 4 -4\nL -2 3 0 0.5 0.4 0.3\nbackground 0.2 0.3 0.5\nM 0.9 0.8 0.7 0.1 0.7 0.4 30 0.3\n"
     text += pictures.triangles(pictures.grid(6)[:, :, [0, 2, 1]] * (3, 1, 3) - (0, 0.6, 0)) + "O\n"
     text += pictures.triangles(0.4 * pictures.cube() @ np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]]) + (-0.9, 0, 0.5)) + "O\n"
     return parse_scene(text + "M 1 1 1 0 0.1 0.5 60 0.1 0.8 1.5\nS 0.5 0 0 0.5\nM 0.3 0.9 0.4 0.1 0.8 0.3 9 0.2\nS 0.1 -0.3 -1 0.2\n")
@@ -212,7 +211,7 @@ def all_effects(context: Context) -> Outcome:
 
     def differences(rung: str, fused: bool) -> int:
         count = 0
-        for scene in (lone, replace(_busy_scene(), depth=3)):
+        for scene in (lone, _busy_scene()):
             plain, full = _tracer(context, scene, rung), _tracer(context, scene, rung, every)
             if fused:
                 full.kernel = _contracted(full)

@@ -30,7 +30,7 @@ def _plane_hits(eye: FloatArray, directions: FloatArray, point: FloatArray, norm
 
 @case(34, "rays that start on triangles of sizes 1e-8 to 1e8", provokes="acne", oracle="S", promised=SAFE)
 def respawned_rays(context: Context) -> Outcome:
-    """A tilted mirror floor under a light and a sky: every pixel is N.L plus the sky, unless a ray meets the floor that it left."""
+    """A tilted mirror floor under a light and a sky: every pixel is N.L plus half the sky, unless a ray meets the floor that it left."""
     rng, size, sky = context.rng(34), 64, 4.0
     scales = 10.0 ** np.arange(-8, 9)
     scenes, naive = [], 0
@@ -38,12 +38,13 @@ def respawned_rays(context: Context) -> Outcome:
         turn = pictures.rotation(rng) * scale
         floor = pictures.grid(6) @ turn.T
         eye, light, normal = turn @ (0.5, -0.4, 0.45), turn @ (-0.7, 0.3, 0.6), turn[:, 2] / scale
-        text = camera(eye, -eye / scale, 50.0, size, turn[:, 1] / scale) + line("L", light) + f"depth 1\nbackground {sky} {sky} {sky}\n"
-        scene = parse_scene(text + "M 1 1 1 0 1 0 1 1\n" + pictures.triangles(floor))
+        text = camera(eye, -eye / scale, 50.0, size, turn[:, 1] / scale) + line("L", light) + f"background {sky} {sky} {sky}\n"
+        text += pictures.company(eye, -eye / scale, scale)
+        scene = parse_scene(text + "M 1 1 1 0 1 0 1 0.5\n" + pictures.triangles(floor))
         points = _plane_hits(scene.camera.eye, scene.camera.directions(), np.zeros(3), normal)
         to_light = light - points
         inside = np.abs(points @ turn / scale**2).max(-1) < 0.999
-        expected = (to_light @ normal / np.linalg.norm(to_light, axis=-1) + sky)[..., None]
+        expected = (to_light @ normal / np.linalg.norm(to_light, axis=-1) + 0.5 * sky)[..., None]
         scenes.append((scene, expected, inside))
         sample = points[inside][::16]
         naive += int(np.count_nonzero(naive_hits(sample, light - sample, floor, NAIVE_EPSILON, 1.0)))
@@ -66,8 +67,9 @@ def tilted_cube(context: Context) -> Outcome:
         offset = rng.normal(size=3) * scale * 1e5
         walls = pictures.cube() @ turn.T + offset
         eye, light = turn @ (0.3, -0.2, 0.1) + offset, turn @ (-0.5, 0.4, 0.6) + offset
-        view = camera(eye, turn @ (-1.0, 0.3, 0.2) / scale, 120.0, size) + line("L", light)
-        mirror.append(parse_scene(view + "depth 6\nbackground 9 9 9\nM 1 1 1 0 0 0 1 1\n" + pictures.triangles(walls)))
+        ahead = turn @ (-1.0, 0.3, 0.2) / scale
+        view = camera(eye, ahead, 120.0, size) + line("L", light) + pictures.company(eye, ahead, scale)
+        mirror.append(parse_scene(view + "background 9 9 9\nM 1 1 1 0 0 0 1 1\n" + pictures.triangles(walls)))
         scene = parse_scene(view + "background 9 9 9\nM 1 1 1 0 1 0 1 0\n" + pictures.triangles(walls))
         inner = scene.camera.directions() @ turn / scale**2
         start, shine = np.array((0.3, -0.2, 0.1)), np.array((-0.5, 0.4, 0.6))
@@ -99,6 +101,7 @@ def sealed_box(context: Context) -> Outcome:
         lights = [turn @ p + shift for p in rng.normal(size=(3, 3)) * 0.2 + 1.3 * np.diag((1.0, -1.0, 1.0))]
         lights += [turn @ (np.array(corner) * 1.01) + shift for corner in ((1, 1, 1), (-1, 1, -1), (1.0, 0.0, 1.0))]
         text = camera(eye, turn @ (0.7, -0.6, 0.8) / scale, 110.0, size) + "".join(line("L", p) for p in lights)
+        text += pictures.company(eye, turn @ (0.7, -0.6, 0.8) / scale, scale)
         scenes.append(parse_scene(text + "M 1 1 1 0 1 1 5 0\n" + pictures.triangles(walls)))
         inner = np.stack([rng.uniform(-1, 1, 200), rng.uniform(-1, 1, 200), -np.ones(200)], -1)
         sample = inner @ turn.T + shift
@@ -123,7 +126,8 @@ def light_on_surface(context: Context) -> Outcome:
         corner, normal = ceiling[rng.integers(2)], turn[:, 2] / scale
         light = corner[0] + (corner[1] - corner[0]) * 0.25 + (corner[2] - corner[0]) * 0.5
         eye = turn @ (0.1, -0.2, 0.5) + shift
-        text = camera(eye, -normal, 60.0, size, turn[:, 1] / scale) + line("L", light) + "M 1 1 1 0 1 0 1 0\n"
+        text = camera(eye, -normal, 60.0, size, turn[:, 1] / scale) + line("L", light)
+        text += pictures.company(eye, -normal, scale) + "M 1 1 1 0 1 0 1 0\n"
         scene = parse_scene(text + pictures.triangles(floor) + "O\n" + pictures.triangles(ceiling))
         points = _plane_hits(scene.camera.eye, scene.camera.directions(), shift, normal)
         to_light = light - points
@@ -156,7 +160,8 @@ def contact_gap(context: Context) -> Outcome:
 def contact_scene(ulps: float, place: float, size: int = 32) -> Scene:
     """Lower card at height `place`, glass `ulps` float32 ulps of 1 above it; the sky is white, the pixel black."""
     gap = ulps * float(np.spacing(np.float32(1.0)))
-    text = camera(np.array((0.1, 0.2, 1.5)), np.array((0.0, 0.0, -1.0)), 40.0, size, np.array((0.0, 1.0, 0.0)))
+    eye, down = np.array((0.1, 0.2, 1.5)), np.array((0.0, 0.0, -1.0))
+    text = camera(eye, down, 40.0, size, np.array((0.0, 1.0, 0.0))) + pictures.company(eye, down)
     text += "L 0.3 0.2 2\nbackground 1 1 1\nM 1 1 1 0 1 0 1 0\n" + pictures.triangles(1.5 * pictures.grid(2) + (0, 0, place))
     return parse_scene(text + "O\nM 1 1 1 0 0 0 1 0 1 1\n" + pictures.triangles(pictures.grid(2) + np.array((0, 0, place + gap))))
 

@@ -22,7 +22,8 @@ def _smooth(corners: FloatArray, normals: FloatArray) -> str:
 
 
 def _ahead(size: int, fov: float) -> str:
-    return camera(np.array((0.03, 0.02, -3.0)), np.array((0.0, 0.0, 1.0)), fov, size, np.array((0.0, 1.0, 0.0)))
+    eye, view = np.array((0.03, 0.02, -3.0)), np.array((0.0, 0.0, 1.0))
+    return camera(eye, view, fov, size, np.array((0.0, 1.0, 0.0))) + pictures.company(eye, view)
 
 
 def _glass_sphere(reflect: float, refract: float, depth: int) -> float:
@@ -34,9 +35,9 @@ def _glass_sphere(reflect: float, refract: float, depth: int) -> float:
 @case(50, "white furnace, each material", provokes="gain or loss", oracle="S", promised=ALL)
 def white_furnace(context: Context) -> Outcome:
     """In a white surrounding nothing is brighter than 1, and what loses nothing is 1."""
-    size, depth, white = 48, 6, "background 1 1 1\n"
+    size, depth, white = 48, pictures.DEPTH, "background 1 1 1\n"
     ball, tilted = "S 0 0 0 1\n", pictures.triangles(0.7 * pictures.cube() @ pictures.rotation(context.rng(50)).T)
-    view = _ahead(size, 50.0) + f"depth {depth}\n"
+    view = _ahead(size, 50.0)
     lossless = [("M 1 1 1 1 0 0 1 0\n", 1.0), ("M 1 1 1 0 0 0 1 1\n", 1.0), ("M 1 1 1 0 0 0 1 0 1 1.5\n", 1.0)]
     exact = [(view + white + m + ball, value) for m, value in lossless]
     exact += [(view + white + m + tilted, value) for m, value in lossless[:2]]
@@ -74,7 +75,8 @@ def facing_away(context: Context) -> Outcome:
         sine, cosine = np.sin(np.radians(tilt)), np.cos(np.radians(tilt))
         normals = np.stack([sine * np.cos(around), np.full(around.shape, cosine), sine * np.sin(around)], -1)
         view = np.array((0.0, -0.25, 1.0))
-        text = camera(np.array((0.0, 0.4, -6.0)), view, 25.0, size, np.array((0.0, 1.0, 0.0))) + "background 0 0 1\ndepth 1\n"
+        eye = np.array((0.0, 0.4, -6.0))
+        text = camera(eye, view, 25.0, size, np.array((0.0, 1.0, 0.0))) + pictures.company(eye, view) + "background 0 0 1\n"
         text += "L 0 9 -3\nM 1 1 1 0 0.5 0.5 3 1\n" + _smooth(floor, normals) + "O\n"
         text += "M 1 0 0 1 0 0 1 0\n" + pictures.triangles(90.0 * pictures.grid(1)[:, :, [0, 2, 1]] - (0, 0.05, 0)) + "O\n"
         scene = parse_scene(text)
@@ -137,7 +139,8 @@ def terminator(context: Context) -> Outcome:
     corners, normals = _coarse_sphere(24, 13)
     for angle in (64.0, 81.0, 99.0, 116.0):  # the terminator inside a facet of 15 degrees
         x, z = float(20 * np.sin(np.radians(angle))), float(-20 * np.cos(np.radians(angle)))
-        text = camera(np.array((0.0, 0.0, -8.0)), np.array((0.0, 0.0, 1.0)), 16.0, size, np.array((0.0, 1.0, 0.0)))
+        eye, view = np.array((0.0, 0.0, -8.0)), np.array((0.0, 0.0, 1.0))
+        text = camera(eye, view, 16.0, size, np.array((0.0, 1.0, 0.0))) + pictures.company(eye, view)
         text += f"L {x!r} 0 {z!r}\nM 1 1 1 0 1 0 1 0\n" + _smooth(corners, normals)
         scenes.append((parse_scene(text), np.array((x, 0.0, z))))
 

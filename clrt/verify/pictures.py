@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+DEPTH = 8  #: of all pictures, since a program is made for its depth
 #: corners of the faces of the cube [-1, 1]^3, (6, 4, 3)
 _CUBE = np.array([
     [[s if a == axis else (1 if (a - axis) % 3 == 1 else 0) * u + (1 if (a - axis) % 3 == 2 else 0) * v for a in range(3)]
@@ -64,6 +65,15 @@ def camera(eye: FloatArray, view: FloatArray, fov: float, size: int, up: FloatAr
     if up is None:
         up = np.eye(3)[np.abs(view).argmin()]
     return line("E", eye) + line("V", view, up) + line("F", fov) + f"R {size} {size}\n"
+
+
+def company(eye: FloatArray, view: FloatArray, scale: float = 1.0) -> str:
+    """Lines that call for every effect but smooth normals, though nothing of them is seen: so that all cases share one program.
+
+    A black light, and far behind the eye a ball of a ten-millionth of `scale`.
+    """
+    text = line("L", eye, np.zeros(3)) + "M 0 0 0 0 0 0 1 0.5 0.5 1.5\n" + line("S", eye - 300.0 * scale * view, 1e-7 * scale)
+    return text + f"depth {DEPTH}\n"
 
 
 def naive_hits(
