@@ -30,12 +30,14 @@ HOT void smooth_normals(const Geometry *geometry, Hit *hit) {
         weight[1][k] = v = clamp(v / area, R(0.0), R(1.0) - u);
         for (int a = 0; a < 3; a++) smooth[a][k] = (R(1.0) - u - v) * corner[a] + u * corner[3 + a] + v * corner[6 + a];
     }
-    for (int a = 0; a < 3; a++) hit->normal[a] = load_lanes(smooth[a]);
-    normalize_n(hit->normal);
     hit->weight[1] = load_lanes(weight[0]);
     hit->weight[2] = load_lanes(weight[1]);
     hit->weight[0] = R(1.0) - hit->weight[1] - hit->weight[2];
     hit->curved = hit->found & load_lanes(curved);
+    // Flat faces keep the normal as it is given: to interpolate would round it.
+    real_n mixed[3] = {load_lanes(smooth[0]), load_lanes(smooth[1]), load_lanes(smooth[2])};
+    normalize_n(mixed);
+    for (int a = 0; a < 3; a++) hit->normal[a] = choose(hit->curved, mixed[a], hit->normal[a]);
 }
 
 // Hanika (Ray Tracing Gems II, 2021, chapter 4): the hit point is projected onto each corner's tangent plane where it lies below it,

@@ -126,7 +126,7 @@ def _busy_scene(size: int = 64) -> Scene:
     """Every effect but smooth normals in one picture."""
     text = pictures.camera(np.array((0.0, 0.5, -3.0)), np.array((0.0, -0.1, 1.0)), 50.0, size, np.array((0.0, 1.0, 0.0)))
     text += f"depth {pictures.DEPTH}\nL 3 4 -4\nL -2 3 0 0.5 0.4 0.3\nbackground 0.2 0.3 0.5\nM 0.9 0.8 0.7 0.1 0.7 0.4 30 0.3\n"
-    text += pictures.triangles(pictures.grid(6)[:, :, [0, 2, 1]] * (3, 1, 3) - (0, 0.6, 0)) + "O\n"
+    text += pictures.triangles(pictures.grid(2)[:, :, [0, 2, 1]] * (3, 1, 3) - (0, 0.6, 0)) + "O\n"
     text += pictures.triangles(0.4 * pictures.cube() @ np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]]) + (-0.9, 0, 0.5)) + "O\n"
     return parse_scene(text + "M 1 1 1 0 0.1 0.5 60 0.1 0.8 1.5\nS 0.5 0 0 0.5\nM 0.3 0.9 0.4 0.1 0.8 0.3 9 0.2\nS 0.1 -0.3 -1 0.2\n")
 
@@ -182,12 +182,13 @@ def launches(context: Context) -> Outcome:
     rows = list(range(0, 64, 8))
     orders = [rows[::-1], [int(r) for r in rng.permutation(rows)]]
     one, two = _digests(context, 1), _digests(context, 2)
+    sizes = ((4, 4), (1, 1), (16, 1)) if context.full else ((4, 4),)  # each is a program to compile
 
     def wrong(rung: str) -> int:
         tracer = _tracer(context, scene, rung)
         whole = _in_bands(tracer, [0], 64)
         count = sum(int((_in_bands(tracer, order, 8) != whole).any(-1).sum()) for order in orders)
-        for size in ((1, 1), (4, 4)):
+        for size in sizes:
             with _local_size(size):
                 count += int((_in_bands(tracer, [0], 64) != whole).any(-1).sum())
         at = context.rungs.index(rung)
@@ -195,9 +196,8 @@ def launches(context: Context) -> Outcome:
 
     samples = rng.uniform(0, 1, (64, 64, 64)).astype(np.float32)
     forwards, backwards = (np.cumsum(s, axis=0, dtype=np.float32)[-1] for s in (samples, samples[::-1]))
-    return Outcome(
-        4 * 64 * 64, context.each_rung(wrong), int(np.count_nonzero(forwards != backwards)), "4 launches of a picture; 2 processes"
-    )
+    naive = int(np.count_nonzero(forwards != backwards))
+    return Outcome((3 + len(sizes)) * 64 * 64, context.each_rung(wrong), naive, "orders, local sizes, processes of 1 and 2 threads")
 
 
 @case(58, "specialised against all-effects kernel", provokes="an effect that leaks into others", oracle="X", promised=ALL)
@@ -209,17 +209,15 @@ def all_effects(context: Context) -> Outcome:
     )  # fmt: skip
     every = Features(tuple((f.name, 0) for f in FEATURES))
 
-    def differences(rung: str, fused: bool) -> int:
-        count = 0
-        for scene in (lone, _busy_scene()):
-            plain, full = _tracer(context, scene, rung), _tracer(context, scene, rung, every)
-            if fused:
-                full.kernel = _contracted(full)
-            pictures_ = [_in_bands(t, [0], 64) for t in (plain, full)]
-            count += int((pictures_[0] != pictures_[1]).any(-1).sum())
-        return count
+    def differences(rung: str, scene: Scene, fused: bool = False) -> int:
+        plain, full = _tracer(context, scene, rung), _tracer(context, scene, rung, every)
+        if fused:
+            full.kernel = _contracted(full)
+        one, other = (_in_bands(t, [0], 64) for t in (plain, full))
+        return int((one != other).any(-1).sum())
 
-    return Outcome(2 * 64 * 64, context.each_rung(lambda rung: differences(rung, False)), differences("fast", True))
+    counts = context.each_rung(lambda rung: sum(differences(rung, scene) for scene in (lone, _busy_scene())))
+    return Outcome(2 * 64 * 64, counts, differences("fast", _busy_scene(), fused=True))
 
 
 def _contracted(tracer: Tracer):  # type: ignore[no-untyped-def]

@@ -141,7 +141,9 @@ def terminator(context: Context) -> Outcome:
         x, z = float(20 * np.sin(np.radians(angle))), float(-20 * np.cos(np.radians(angle)))
         eye, view = np.array((0.0, 0.0, -8.0)), np.array((0.0, 0.0, 1.0))
         text = camera(eye, view, 16.0, size, np.array((0.0, 1.0, 0.0))) + pictures.company(eye, view)
-        text += f"L {x!r} 0 {z!r}\nM 1 1 1 0 1 0 1 0\n" + _smooth(corners, normals)
+        text += f"L {x!r} 0 {z!r}\nM 1 1 1 0 1 0 1 0\n"
+        for part in np.array_split(np.arange(len(corners)), 16):  # an object each: small trees, and so the program of other cases
+            text += _smooth(corners[part], normals[part]) + "O\n"
         scenes.append((parse_scene(text), np.array((x, 0.0, z))))
 
     def steps(row: FloatArray, light: FloatArray) -> int:
