@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from clrt.device.context import DeviceInfo
 
 
-@click.command("devices")
+@click.command("devices", epilog="docs/devices.md tells how to add one: Intel's runtime for processors, or a distribution's PoCL.")
 def devices() -> None:
     """List the OpenCL devices; a star marks the one that is used."""
     from clrt.cli.report import print_plainly
