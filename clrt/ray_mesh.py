@@ -35,14 +35,16 @@ def scene_of(mesh: Any) -> Scene:
             _check_finite(item.vertices, item.name, "triangle")
         return mesh
     objects: list[MeshObject] = []
-    first = flat = 0
+    flat: list[str] = []
+    first = 0
     for name, part in _parts(mesh):
         corners = _corners(part, name)
         normals = surface_normals(corners)
         objects.append(MeshObject(corners, normals, np.zeros(len(corners), np.int32), first, name=name))
         first += len(corners)
-        flat += int(np.count_nonzero(~normals.any(axis=1)))
-    warnings = (f"{flat} {'triangle has' if flat == 1 else 'triangles have'} zero area and are never hit",) if flat else ()
+        flat += [f"{name}, face {face}" for face in np.flatnonzero(~normals.any(axis=1))]
+    told = "1 triangle has zero area and is" if len(flat) == 1 else f"{len(flat)} triangles have zero area and are"
+    warnings = (f"{told} never hit (the first: {flat[0]})",) if flat else ()
     camera = Camera.from_view(np.zeros(3), np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]), 45.0, 1, 1)
     return Scene(camera, (), (Material((1.0, 1.0, 1.0), 0.0, 0.0, 0.0, 1.0),), tuple(objects), source="<mesh>", warnings=warnings)
 
