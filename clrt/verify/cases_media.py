@@ -299,9 +299,15 @@ def many_reflections(context: Context) -> Outcome:
     inside = d * (1, 1, 0) / 1.6
     inside[..., 2] = np.sqrt(1 - (inside[..., :2] ** 2).sum(-1))
     start = scene.camera.eye[:2] + 0.001 * d[..., :2] / d[..., 2:]
-    place = (start + 5.5 * inside[..., :2] / inside[..., 2:] + half) / (2 * half)
+    first = (start + half) / (2 * half)
+    place = first + 5.5 * inside[..., :2] / inside[..., 2:] / (2 * half)
     turns = np.abs(np.floor(place)).sum(-1)
-    sure = (np.abs(place - np.rint(place)) > 0.01).all(-1) & (np.abs(start) < half).all(-1) & (turns <= REFLECTIONS + 4)
+    sure = (
+        (np.abs(place - np.rint(place)) > 0.01).all(-1)
+        & (np.abs(start) < half).all(-1)
+        & (turns <= REFLECTIONS + 4)
+        & (_off_corners(first, place) > 1e-3)
+    )
     expected = KEPT ** (turns + 2)
 
     def wrong(rung: str) -> int:
@@ -314,6 +320,20 @@ def many_reflections(context: Context) -> Outcome:
     return Outcome(
         int(sure.sum()), context.each_rung(wrong), _drifted(context, 1.6), f"up to {int(turns[sure].max())} reflections in a row"
     )
+
+
+def _off_corners(first: FloatArray, last: FloatArray) -> FloatArray:
+    """(h, w): how near the line from `first` to `last`, (h, w, 2) each, comes to a corner of the unit lattice: two walls at once."""
+    nearest = np.full(first.shape[:2], np.inf)
+    run = last - first
+    for axis in (0, 1):
+        for wall in range(-REFLECTIONS, REFLECTIONS + 1):
+            with np.errstate(divide="ignore", invalid="ignore"):
+                share = (wall - first[..., axis]) / run[..., axis]
+                other = first[..., 1 - axis] + share * run[..., 1 - axis]
+                gap = np.abs(other - np.rint(other))
+            nearest = np.where((share > 0) & (share < 1), np.minimum(nearest, gap), nearest)
+    return nearest
 
 
 def _drifted(context: Context, index: float) -> int:
