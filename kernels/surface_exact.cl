@@ -48,8 +48,9 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
     error = refined_error;
 //@end
 //@hook shadow_above
-    // A ray that ends on a flat triangle ends at its plane, compared exactly: no offset hides what touches it.
-    mask_n planar = is_less(load_lanes(hit->slot), (mask_n)geometry->slot_count);
+    // A ray that ends on a flat triangle ends at its plane, compared exactly: no offset hides what touches it. Not so one that comes
+    // from behind the plane: there the triangle itself may stand between, and the end must be on the viewer's side.
+    mask_n planar = is_less(load_lanes(hit->slot), (mask_n)geometry->slot_count) & is_less(dot_n(hit->geometric, span), (real_n)0);
     for (int a = 0; a < 3; a++) planar &= is_equal(end[a], hit->point[a]);
     above = choose(planar, (real_n)0, above);
 //@end
