@@ -34,12 +34,13 @@ HIT_DTYPE = layout.HIT_RECORD
 _CHUNK = 1 << 18  #: rays a launch: keeps buffers small and lets Ctrl-C in
 _LOCAL = 8  #: packets a work-group
 _FINISH_LOCAL = 64
-_FIRST, _ANY, _COUNT = 0, 1, 2  #: modes of the kernel `cast`
-_GIVEN, _RESULT, _RAYS, _MODE, _STAGES = 10, 11, 12, 13, 14  #: its arguments that change
+_LIST_LIMIT = 1 << 20  #: hits listed by a launch, but for a single ray that has more
+_FIRST, _ANY, _COUNT, _LIST = 0, 1, 2, 3  #: modes of the kernel `cast`
+_GIVEN, _RESULT, _HIT_LIST, _RAYS, _MODE, _STAGES = 10, 11, 12, 13, 14, 15  #: its arguments that change
 
 
 class RayCaster:
-    """First, any and counted hits of rays with triangles.
+    """First, any, all and counted hits of rays with triangles.
 
     mesh : (vertices (n, 3), faces (m, 3)); triangles (m, 3, 3); an object with .vertices and .faces, such as a trimesh.Trimesh; a list
         of such pairs and objects, one object id each; or a Scene, of which spheres are left out. No triangles: every ray misses.
@@ -104,7 +105,7 @@ class RayCaster:
         rays = RayArrays.of(origins, directions, t_min, t_max)
         hits = np.empty(len(rays), HIT_DTYPE)
         for part in self._cast(rays, _FIRST):
-            self._finish(hits[part])
+            self._finish(hits[part], None)
         return hits.reshape(rays.shape)
 
     def any_hit(self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf) -> NDArray[np.bool_]:
@@ -121,10 +122,47 @@ class RayCaster:
         An edge or a corner that a ray meets counts once for each triangle it belongs to. Takes a traversal for each hit.
         """
         rays = RayArrays.of(origins, directions, t_min, t_max)
+        return self._counted(rays).reshape(rays.shape)
+
+    def all_hits(
+        self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf
+    ) -> tuple[NDArray[np.int64], NDArray[np.void]]:
+        """Every hit in the open interval (t_min, t_max): ray_ids (k,) int64, hits (k,) of HIT_DTYPE. Arguments as in `first_hit`.
+
+        Ordered by ray, then t, then primitive id; ray_ids are places in the flattened rays. An edge or a corner that a ray meets is a
+        hit for each triangle it belongs to. Takes two traversals for each hit.
+        """
+        rays = RayArrays.of(origins, directions, t_min, t_max)
+        counts = self._counted(rays)
+        ends = np.cumsum(counts)
+        hits = np.empty(int(counts.sum()), HIT_DTYPE)
+        first = done = 0
+        while done < len(hits):
+            some = max(1, int(np.searchsorted(ends[first : first + _CHUNK], done + _LIST_LIMIT, side="right")))
+            part = slice(first, first + some)
+            first, end = part.stop, int(ends[part.stop - 1])
+            if end > done:
+                self._list(rays, part, ends[part] - counts[part] - done, hits[done:end])
+            done = end
+        return np.repeat(np.arange(len(rays)), counts), hits
+
+    def _counted(self, rays: RayArrays) -> NDArray[np.int64]:
         counts = np.empty(len(rays), np.int64)
         for part in self._cast(rays, _COUNT):
             counts[part] = self._results(part)
-        return counts.reshape(rays.shape)
+        return counts
+
+    def _list(self, rays: RayArrays, part: slice, starts: NDArray[np.int64], hits: NDArray[np.void]) -> None:
+        """Fills `hits` with all hits of the rays `part`; those of each begin at `starts`."""
+        import pyopencl as cl
+
+        self._load(rays, part)
+        cl.enqueue_copy(self._device.queue, self._result, starts.astype(np.int32))
+        found = self._buffers.empty(8 * len(hits))
+        self._cast_kernel.set_arg(_HIT_LIST, found)
+        self._launch(part.stop - part.start, _LIST)
+        self._cast_kernel.set_arg(_HIT_LIST, None)  # later launches must not meet a buffer that is gone
+        self._finish(hits, found)
 
     def _set_arguments(self, built: Any) -> None:
         """Sets what is the same for all launches; pyopencl makes a new kernel object at each attribute access of a program."""
@@ -139,6 +177,7 @@ class RayCaster:
         )  # fmt: skip
         for place, value in enumerate(constant):
             self._cast_kernel.set_arg(place, value)
+        self._cast_kernel.set_arg(_HIT_LIST, None)
         self._finish_kernel.set_arg(0, buffers.vertices)
         self._finish_kernel.set_arg(1, self._sources)
 
@@ -155,26 +194,34 @@ class RayCaster:
 
     def _cast(self, rays: RayArrays, mode: int) -> Iterator[slice]:
         """Casts a chunk after the other; gives the rays whose results will be on the device."""
-        import pyopencl as cl
-
-        queue = self._device.queue
         self._rays, self._counters = len(rays), None
         if self.precision.decides_in_stages:
             # New ones: a tenth of the time of setting old ones to zero through the queue.
             self._stages = StageCounter(self._buffers)
             self._cast_kernel.set_arg(_STAGES, self._stages.buffer)
         for first in range(0, len(rays), _CHUNK):
-            count = min(_CHUNK, len(rays) - first)
-            self._reserve(count)
-            # Mapped, not copied: on a CPU the records are written where the kernel reads them.
-            records, _ = cl.enqueue_map_buffer(queue, self._given, cl.map_flags.WRITE_INVALIDATE_REGION, 0, (count,), layout.GIVEN_RAY)
-            rays.write(records, first, self._scale)
-            records.base.release(queue)
-            self._cast_kernel.set_arg(_RAYS, np.int32(count))
-            self._cast_kernel.set_arg(_MODE, np.int32(mode))
-            packets = -(-count // self._lanes)
-            cl.enqueue_nd_range_kernel(queue, self._cast_kernel, (-(-packets // _LOCAL) * _LOCAL,), (_LOCAL,))
-            yield slice(first, first + count)
+            part = slice(first, min(first + _CHUNK, len(rays)))
+            self._load(rays, part)
+            self._launch(part.stop - part.start, mode)
+            yield part
+
+    def _load(self, rays: RayArrays, part: slice) -> None:
+        """Brings the rays `part` to the device. Mapped, not copied: on a CPU they are written where the kernel reads them."""
+        import pyopencl as cl
+
+        queue, count, flags = self._device.queue, part.stop - part.start, cl.map_flags.WRITE_INVALIDATE_REGION
+        self._reserve(count)
+        records, _ = cl.enqueue_map_buffer(queue, self._given, flags, 0, (count,), layout.GIVEN_RAY)
+        rays.write(records, part.start, self._scale)
+        records.base.release(queue)
+
+    def _launch(self, count: int, mode: int) -> None:
+        import pyopencl as cl
+
+        self._cast_kernel.set_arg(_RAYS, np.int32(count))
+        self._cast_kernel.set_arg(_MODE, np.int32(mode))
+        packets = -(-count // self._lanes)
+        cl.enqueue_nd_range_kernel(self._device.queue, self._cast_kernel, (-(-packets // _LOCAL) * _LOCAL,), (_LOCAL,))
 
     def _results(self, part: slice) -> NDArray[np.int32]:
         import pyopencl as cl
@@ -183,14 +230,14 @@ class RayCaster:
         cl.enqueue_copy(self._device.queue, results, self._result)
         return results
 
-    def _finish(self, hits: NDArray[np.void]) -> None:
-        """Fills `hits` from the slots that the last cast found."""
+    def _finish(self, hits: NDArray[np.void], found: Any) -> None:
+        """Fills `hits` from the slots that the last launch found, or those listed in the buffer `found`."""
         import pyopencl as cl
 
         queue, flags = self._device.queue, cl.mem_flags.WRITE_ONLY | cl.mem_flags.USE_HOST_PTR
         records = cl.Buffer(self._device.context, flags, hostbuf=hits)
-        self._finish_kernel.set_arg(4, np.int32(len(hits)))
-        self._finish_kernel.set_arg(5, records)
+        for place, value in enumerate((found, np.int32(found is not None), np.int32(len(hits)), records), 4):
+            self._finish_kernel.set_arg(place, value)
         cl.enqueue_nd_range_kernel(queue, self._finish_kernel, (-(-len(hits) // _FINISH_LOCAL) * _FINISH_LOCAL,), (_FINISH_LOCAL,))
         # Where the device has memory of its own, this is what brings the records here.
         mapped, _ = cl.enqueue_map_buffer(queue, records, cl.map_flags.READ, 0, hits.shape, hits.dtype)

@@ -1,4 +1,4 @@
-// Provides: kernels cast (arrays of rays: first, any, or all hits) and cast_finish (the records of first hits).
+// Provides: kernels cast (arrays of rays: first, any, all hits or their number) and cast_finish (the records of hits).
 // Needs: scene.cl, triangle.cl, structs.  Reads: nothing.
 //
 // A GivenRay comes as the caller gave it. Its direction is scaled in place by a power of two, without rounding, that brings its largest
@@ -8,6 +8,7 @@
 #define FIRST_HIT 0
 #define ANY_HIT 1
 #define COUNT_HITS 2
+#define LIST_HITS 3
 
 // False for a ray that is known to miss: a NaN, an infinity, no direction, an empty interval.
 HOT int ray_scaled(global GivenRay *ray) {
@@ -29,12 +30,13 @@ HOT int ray_scaled(global GivenRay *ray) {
     return 1;
 }
 
-// result: the slot of the hit or -1 a ray, or for COUNT_HITS the number of hits.
+// result: the slot of the hit or -1 a ray; for COUNT_HITS the number of hits; for LIST_HITS, given, where the ray's hits begin in `list`,
+// which gets (slot, ray) for each, in the order of t and id.
 // The hint keeps a compiler's own vectoriser (Intel's) off lanes that are vectors already: it would take seconds, for slower code.
 kernel __attribute__((vec_type_hint(real_n)))
 void cast(global const int2 *nodes, global const int *indices, global const Triangle *triangles, global const double *vertices,
           global const Object *objects, global const Surface *surfaces, int object_count, int slot_count, double4 local_origin,
-          real extent, global GivenRay *given, global int *result, int count, int mode
+          real extent, global GivenRay *given, global int *result, global int2 *list, int count, int mode
           //@ parameters
 ) {
     const int first = get_global_id(0) * LANES;
@@ -87,22 +89,26 @@ void cast(global const int2 *nodes, global const int *indices, global const Tria
     rays.after = (mask_n)-1;
     rays.after_t = (real_n)0;
     rays_prepare(&rays, extent);
-    // To count, one hit is sought after the other, in the order of t and id, until no lane has a further one.
+    // To count or list, one hit is sought after the other, in the order of t and id, until no lane has a further one.
     for (int round = 0; round <= slot_count; round++) {
         hits.t = rays.t_max;
         hits.slot = (mask_n)-1;
         //@ hits_begin
         if (any_lane(rays.active)) scene_trace(&geometry, &rays, 0, mode == ANY_HIT, &hits);
         hits.slot = choose(rays.active, hits.slot, (mask_n)-1);
-        if (mode != COUNT_HITS) break;
+        store_lanes(hits.slot, slot);
+        if (mode < COUNT_HITS) break;
         rays.active = is_at_least(hits.slot, NO_LANES);
         if (!any_lane(rays.active)) break;
         rays.after = hits.slot;
         rays.after_t = hits.t;
-        store_lanes(rays.active, active);
-        for (int k = 0; k < LANES; k++) hit_count[k] -= (int)active[k];
+        for (int k = 0; k < LANES; k++) {
+            if (slot[k] < 0) continue;
+            if (mode == LIST_HITS) list[result[first + k] + hit_count[k]] = (int2)((int)slot[k], first + k);
+            hit_count[k]++;
+        }
     }
-    store_lanes(hits.slot, slot);
+    if (mode == LIST_HITS) return;
     for (int k = 0; k < LANES && first + k < count; k++) result[first + k] = mode == COUNT_HITS ? hit_count[k] : (int)slot[k];
 }
 
@@ -114,22 +120,22 @@ HOT double corner_seen(double corner, double origin, double direction, double s)
     return (high - product) + (low - rest);
 }
 
-// The record of each first hit, by the numbers as given, in float64. With a = v0 - o, n = e1 x e2 and rate = d.n:
+// The record of each ray's first hit, or, `listed`, of each hit in `list`; by the numbers as given, in float64. With a = v0 - o, n = e1 x e2 and rate = d.n:
 //   t = a.n / rate,  u = d.(e2 x a) / rate,  v = d.(a x e1) / rate.
 // No multiple of d added to a changes u and v, so they are taken from `near` = a - s d at s = t but for rounding, which is no longer than
 // the triangle however far the origin is; and t = s + near.n / rate.
 kernel void cast_finish(global const double *vertices, global const HitSource *sources, global const GivenRay *given,
-                        global const int *result, int count, global HitRecord *records) {
+                        global const int *result, global const int2 *list, int listed, int count, global HitRecord *records) {
     const int i = get_global_id(0);
     if (i >= count) return;
-    const int slot = result[i];
+    const int slot = listed ? list[i].x : result[i];
     if (slot < 0) {
         const HitRecord miss = {INFINITY, 0, 0, -1, -1, {0, 0, 0}};
         records[i] = miss;
         return;
     }
     global const double *corners = vertices + 9 * (size_t)slot;
-    global const GivenRay *ray = given + i;
+    global const GivenRay *ray = given + (listed ? list[i].y : i);
     double a[3], d[3], e1[3], e2[3], n[3], near[3], cross[3];
     for (int axis = 0; axis < 3; axis++) {
         a[axis] = corners[axis] - ray->origin[axis];

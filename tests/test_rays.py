@@ -215,6 +215,42 @@ def test_chunks_change_no_bit(rabbit: clrt.RayCaster, monkeypatch: pytest.Monkey
     assert unsure["rays"] == 500
 
 
+def test_all_hits_of_a_stack_of_walls(stack: clrt.RayCaster) -> None:
+    """Ray i starts below wall i + 1: its hits are the walls above, in order."""
+    origins = ASIDE + np.arange(10)[:, None] * UP
+    ray_ids, hits = stack.all_hits(origins + UP / 2, UP, t_max=3.0)
+    expected = [(i, z - i - 0.5) for i in range(10) for z in range(i + 1, min(9, i + 4))]
+    assert list(zip(ray_ids.tolist(), hits["t"].tolist(), strict=True)) == expected
+    assert (hits["prim_id"] // 2 == ray_ids + hits["t"] + 0.5 - 1).all()
+    assert (hits["u"] + hits["v"] <= 1).all()
+
+
+@pytest.mark.parametrize("limit", [1, 7, 1 << 20])
+def test_all_hits_begin_with_the_first_and_are_as_many_as_counted(
+    rabbit: clrt.RayCaster, monkeypatch: pytest.MonkeyPatch, limit: int
+) -> None:
+    monkeypatch.setattr("clrt.rays._LIST_LIMIT", limit)
+    monkeypatch.setattr("clrt.rays._CHUNK", 64)
+    origins, directions = random_rays(200, 12)
+    ray_ids, hits = rabbit.all_hits(origins, directions)
+    counts, first = rabbit.count_hits(origins, directions), rabbit.first_hit(origins, directions)
+    assert (np.bincount(ray_ids, minlength=200) == counts).all()
+    starts = np.cumsum(counts) - counts
+    assert hits[starts[counts > 0]].tobytes() == first[counts > 0].tobytes()
+    same_ray = np.diff(ray_ids) == 0
+    assert (np.diff(ray_ids) >= 0).all()
+    assert (np.diff(hits["t"])[same_ray] > 0).all()
+
+
+def test_all_hits_of_equal_t_are_ordered_by_id() -> None:
+    copies = clrt.RayCaster(np.repeat(walls([1.0, 2.0]), 3, axis=0))
+    ray_ids, hits = copies.all_hits([ASIDE, ASIDE], UP)
+    assert hits["prim_id"].tolist() == [3, 4, 5, 9, 10, 11] * 2
+    assert ray_ids.tolist() == [0] * 6 + [1] * 6
+    assert [len(a) for a in copies.all_hits(ASIDE, -UP)] == [0, 0]
+    assert [len(a) for a in copies.all_hits([], UP)] == [0, 0]
+
+
 NO_RAYS: dict[str, tuple[list[float], list[float]]] = {
     "nan origin": ([np.nan, 0, 0], [0, 0, 1]),
     "nan direction": ([0, 0, 0], [0, np.nan, 1]),
