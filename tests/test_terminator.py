@@ -112,7 +112,7 @@ def test_coarse_convex_mesh_is_lit_by_its_normals_alone(light: Vector) -> None:
     assert (expected - naive).max() > 0.05
 
 
-@pytest.mark.parametrize("light", [LIGHTS[0], LIGHTS[1], LIGHTS[3], LIGHTS[4]])
+@pytest.mark.parametrize("light", [LIGHTS[1], LIGHTS[4]])
 def test_light_falls_off_evenly_along_rows(light: Vector) -> None:
     """A true ball falls by closed form; the mesh may fall half as steeply again, by polygons there is a step."""
     scene = _ball(light)
