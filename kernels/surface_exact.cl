@@ -3,20 +3,27 @@
 
 // The points where rays meet triangles again, in float64 from the numbers as given: rounded once, they lie off the surface by u |P|
 // a coordinate, as much again for the offset, and the float64 error; which is what `error` becomes. Spheres keep theirs.
+// A point nearer to an edge than 8u |P| is moved to that distance inside its triangle: rounded, it could else lie behind the face
+// beyond the edge, and a ray inside of a closed mesh would leave it there.
 static __attribute__((noinline)) void refine_points(const Geometry *geometry, const Rays *rays, const int shared_origin, const Hit *hit,
                                                     mask_n active, real_n *point, real_n *error) {
     lane_int lane[LANES];
-    real p[3][LANES], n[3][LANES], e[LANES];
+    real p[3][LANES], n[3][LANES], e[LANES], from[3][LANES], along[3][LANES];
     store_lanes(active, lane);
     store_lanes(*error, e);
     for (int a = 0; a < 3; a++) {
         store_lanes(point[a], p[a]);
         store_lanes(hit->geometric[a], n[a]);
+        store_lanes(rays->origin[a], from[a]);
+        store_lanes(rays->direction[a], along[a]);
     }
     for (int k = 0; k < LANES; k++) {
         if (!lane[k] || hit->slot[k] >= geometry->slot_count) continue;
-        double origin[3], direction[3], t_min, t_max, e1[3], e2[3], normal[3], sum = 0;
-        ray_given(geometry, rays, k, shared_origin, origin, direction, &t_min, &t_max);
+        double origin[3], direction[3], e1[3], e2[3], normal[3], at[3], cross[3], sum = 0, size = 0;
+        for (int a = 0; a < 3; a++) {
+            origin[a] = shared_origin ? geometry->shared_origin[a] : geometry->local_origin[a] + (double)from[a][k];
+            direction[a] = (double)along[a][k];
+        }
         global const double *v = geometry->vertices + 9 * (size_t)hit->slot[k];
         Plane plane;
         plane_distance_double(geometry, origin, direction, (int)hit->slot[k], &plane);
@@ -24,12 +31,24 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
         for (int a = 0; a < 3; a++) {
             e1[a] = v[3 + a] - v[a];
             e2[a] = v[6 + a] - v[a];
-            const double exact = origin[a] - geometry->local_origin[a] + t * direction[a];
+            at[a] = origin[a] - v[a] + t * direction[a];
+            size += fabs(v[a] - geometry->local_origin[a] + at[a]);
+        }
+        cross_double(e1, e2, normal);
+        const double area = dot_double(normal, normal);
+        cross_double(at, e2, cross);
+        const double u = dot_double(cross, normal) / area;
+        cross_double(e1, at, cross);
+        const double w = dot_double(cross, normal) / area;
+        const double longest = sqrt(fmax(dot_double(e1, e1), dot_double(e2, e2))) * 2;
+        const double least = fmin(fmin(u, w), 1 - u - w), wanted = fmin(0.1, 8 * UNIT_ROUNDOFF * size * longest / sqrt(area));
+        const double inwards = least < wanted ? (wanted - least) / (1.0 / 3 - least) : 0;
+        for (int a = 0; a < 3; a++) {
+            const double exact = v[a] - geometry->local_origin[a] + at[a] + inwards * ((e1[a] + e2[a]) / 3 - at[a]);
             p[a][k] = (real)exact;
             sum += fabs(exact * n[a][k]);
         }
-        cross_double(e1, e2, normal);
-        const double rest = (plane.offset_error + fabs(t) * plane.rate_error) / sqrt(dot_double(normal, normal));
+        const double rest = (plane.offset_error + fabs(t) * plane.rate_error) / sqrt(area);
         e[k] = (real)(2 * UNIT_ROUNDOFF * sum + 2 * rest);
     }
     for (int a = 0; a < 3; a++) point[a] = load_lanes(p[a]);
