@@ -74,7 +74,8 @@ def light(real: type) -> np.dtype[np.void]:
 
 
 def sphere(real: type) -> np.dtype[np.void]:
-    return struct_dtype([("center", real, (3,)), ("radius", real), ("material", np.int32)])
+    """A sphere relative to the local origin, rounded, and as it is: centre and radius."""
+    return struct_dtype([("given", np.float64, (4,)), ("center", real, (3,)), ("radius", real), ("material", np.int32)])
 
 
 _F8_VECTOR: Any = (np.float64, (3,))

@@ -205,7 +205,8 @@ def _lights(packed: Packed) -> NDArray[np.void]:
 def _spheres(packed: Packed) -> NDArray[np.void]:
     spheres = packed.scene.spheres
     records = np.zeros(len(spheres), layout.sphere(packed.real))
-    records["center"], records["radius"] = spheres.centers - packed.origin, spheres.radii
+    records["given"] = np.column_stack([spheres.centers - packed.origin, spheres.radii])
+    records["center"], records["radius"] = records["given"][:, :3], records["given"][:, 3]
     records["material"] = spheres.material_ids
     return records
 

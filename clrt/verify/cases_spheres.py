@@ -7,12 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+import clrt.reference
 from clrt.precision import rung as rung_named
-from clrt.verify import probe
+from clrt.scene.build import parse_scene
+from clrt.scene.model import Scene
+from clrt.verify import pictures, probe
 from clrt.verify.case import ALL, Context, Outcome, case
 
 FloatArray = NDArray[np.float64]
 Wide = np.longdouble
+FIRM = 2e-5  #: margin of the reference above which a pixel's decisions are certain
 
 _KERNEL = """
 kernel void probe_spheres(global const real *origin, global const real *direction, global const Sphere *spheres, global const int *skip,
@@ -191,9 +195,27 @@ def floor_sphere(context: Context) -> Outcome:
         steep = (first > 0) & (height / np.where(first > 0, expected, np.inf) > 0.0175)
         return int(np.count_nonzero(steep & ~(np.abs(t - expected) <= 1e-5 * expected)))
 
-    counts = context.each_rung(lambda rung: off(b := balls_for(rung), b.trace(context, rung)))
+    scene = _ball_on_floor()
+    reference = clrt.reference.render(scene)
+    firm = reference.margin > FIRM
+
+    def wrong(rung: str) -> int:
+        balls = balls_for(rung)
+        pixels = firm & ~(np.abs(context.render(scene, rung) - reference.pixels) <= 1e-3).all(-1)
+        return off(balls, balls.trace(context, rung)) + int(np.count_nonzero(pixels))
+
     balls = balls_for("watertight")
-    return Outcome(balls.origin[..., 0].size, counts, off(balls, balls.naive()))
+    rays = balls.origin[..., 0].size + int(firm.sum())
+    return Outcome(
+        rays, context.each_rung(wrong), off(balls, balls.naive()), "single rays, and a picture with shadows against the reference"
+    )
+
+
+def _ball_on_floor() -> Scene:
+    """A ball on a floor sphere, with its shadow, from a height of 1."""
+    eye, view = np.array((0.2, 1.0, -3.0)), np.array((0.0, -0.3, 1.0))
+    text = pictures.camera(eye, view, 50.0, 64, np.array((0.0, 1.0, 0.0))) + pictures.company(eye, view)
+    return parse_scene(text + "L 3 4 -2\nM 0.9 0.8 0.7 0.1 0.8 0 1 0\nS 0 -1e6 0 1e6\nM 0.3 0.5 0.9 0.1 0.8 0.3 9 0.3\nS 0 0.5 0 0.5\n")
 
 
 @case(42, "origin on a sphere, inside and outside", provokes="the wrong root", oracle="S", promised=ALL)

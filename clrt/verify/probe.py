@@ -64,5 +64,6 @@ def run(
 def sphere_records(centers: NDArray[np.float64], radii: NDArray[np.float64], real: type) -> NDArray[np.void]:
     """Sphere structs as the kernels read them."""
     records = np.zeros(len(radii), layout.sphere(real))
+    records["given"] = np.column_stack([centers, radii])
     records["center"], records["radius"] = centers, radii
     return records
