@@ -142,6 +142,25 @@ def test_a_corner_counts_for_each_of_its_triangles(triangles: int) -> None:
     assert fan.first_hit([0.0, 0.0, -1.0], UP)["prim_id"].tolist() == [0]
 
 
+def test_every_triangle_of_equal_t_counts_whatever_the_order(rung: str) -> None:
+    """Straight down on the corners of a flat sheet: 4 or 8 triangles, all at t = 1, their ids in any order over the tree's leaves."""
+    rng = np.random.default_rng(13)
+    y, x = np.mgrid[-4:4, -4:4].astype(np.float64)
+    a, b, c, d = (np.stack([x + i, y + j, np.ones_like(x)], axis=-1) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1)))
+    odd = ((x + y) % 2 == 1)[..., None, None]
+    halves = [np.where(odd, np.stack(p, axis=-2), np.stack(q, axis=-2)) for p, q in (((a, b, d), (a, b, c)), ((b, c, d), (a, c, d)))]
+    sheet = rng.permutation(np.concatenate(halves).reshape(-1, 3, 3))
+    points = np.stack(np.meshgrid(np.arange(-3.0, 4), np.arange(-3.0, 4)), axis=-1).reshape(-1, 2)
+    expected = [np.count_nonzero((sheet == [*point, 1.0]).all(axis=-1).any(axis=-1)) for point in points]
+    assert set(expected) == {4, 8}
+    caster = clrt.RayCaster(sheet, precision=rung)
+    origins = np.c_[points, np.zeros(len(points))]
+    assert caster.count_hits(origins, UP).tolist() == expected
+    ray_ids, hits = caster.all_hits(origins, UP)
+    assert len(ray_ids) == sum(expected)
+    assert (np.diff(hits["prim_id"])[np.diff(ray_ids) == 0] > 0).all()
+
+
 def test_closed_surface_is_crossed_an_even_number_of_times(rabbit: clrt.RayCaster) -> None:
     """From far outside, a ray that meets no edge or corner enters as often as it leaves."""
     origins, directions = random_rays(3000, 4)
