@@ -234,3 +234,15 @@ def test_lost_in_tree_counts_true_hits_alone() -> None:
     by_tree = Truth(np.array([1, -1, 0]), np.array([2.0, np.inf, 1.0]))
     assert lost_in_tree(tri, rays, by_tree, everything, exactly=False) == 1
     assert lost_in_tree(tri, rays, by_tree, everything, exactly=True) == 2
+
+
+def test_markdown_goes_between_the_marks_of_a_page(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- verify:begin -->\nold\n<!-- verify:end -->\nafter\n")
+    done = CliRunner().invoke(cli, ["verify", "--case", "33", "--markdown", str(page), "--quiet"], standalone_mode=False)
+    assert done.return_value == 0, done.output
+    text = page.read_text()
+    assert text.startswith("before\n<!-- verify:begin -->\n")
+    assert text.endswith("<!-- verify:end -->\nafter\n")
+    assert "| 33 | NaN and infinite vertices | 12 | 0 | 0 | 0 | 0 | 12 | pass |" in text
+    assert "old" not in text

@@ -17,13 +17,19 @@ if TYPE_CHECKING:
     from clrt.verify.case import Context, Result
 
 
+_BEGIN, _END = "<!-- verify:begin -->", "<!-- verify:end -->"
+
+
 @click.command("verify")
 @click.option("--full", is_flag=True, help="1,000,000 rays a case instead of 100,000: many minutes.")
 @click.option("--case", "numbers", type=click.IntRange(min=1), multiple=True, metavar="N", help="Run this case alone; may be repeated.")
 @click.option("--json", "json_path", metavar="FILE", help="Write all results as JSON too; - for standard output, instead of the table.")
+@click.option(
+    "--markdown", "page", metavar="FILE", help="Write the table as Markdown too, between the marks of a page that has <!-- verify:begin -->."
+)
 @click.option("--device", metavar="NAME", help="Part of the name of a device that `clrt devices` lists.")
 @click.option("--quiet", is_flag=True, help="No table and no progress: broken promises and the exit code only.")
-def verify(full: bool, numbers: tuple[int, ...], json_path: str | None, device: str | None, quiet: bool) -> int:
+def verify(full: bool, numbers: tuple[int, ...], json_path: str | None, page: str | None, device: str | None, quiet: bool) -> int:
     """Run the hard cases of docs/numerics.md on this machine.
 
     Counts disagreements with the oracle for each precision, and for a naive variant, which must fail. Exit codes: 0 all promises
@@ -32,13 +38,16 @@ def verify(full: bool, numbers: tuple[int, ...], json_path: str | None, device: 
     from clrt.verify.run import chosen, context_for, failures, run, to_json
 
     cases = chosen(numbers)
-    if json_path not in (None, "-"):
-        check_writable(json_path)
+    for path in (json_path, page):
+        if path not in (None, "-"):
+            check_writable(path)
     context = context_for(device, full=full)
     with PhaseProgress(quiet=quiet) as progress:
         results = run(cases, context, lambda _, done: progress("running the hard cases", done))
     if json_path is not None:
         _write_json(json.dumps(to_json(results, context), indent=2, ensure_ascii=False) + "\n", json_path)
+    if page is not None:
+        _write_page(markdown_table(results, context), page)
     if not quiet and json_path != "-":
         _print(results, context)
     broken = failures(results, context)
@@ -53,6 +62,41 @@ def _write_json(text: str, path: str) -> None:
     else:
         with atomic_write(path) as file:
             file.write(text.encode())
+
+
+def _write_page(text: str, path: str) -> None:
+    """The table into the marked place of a page that has one, or as the whole of the file."""
+    from pathlib import Path
+
+    page = Path(path)
+    found = page.read_text(encoding="utf-8") if page.exists() else ""
+    if _BEGIN in found and _END in found:
+        before, after = found.partition(_BEGIN)[0], found.partition(_END)[2]
+        text = f"{before}{_BEGIN}\n{text}\n{_END}{after}"
+    with atomic_write(path) as file:
+        file.write(text.encode())
+
+
+def markdown_table(results: list[Result], context: Context) -> str:
+    """The table of results as Markdown, under a line that says when and on what it was made."""
+    import datetime
+
+    from clrt.device.context import open_device
+
+    info = open_device(context.device).info
+    lines = [
+        f"{datetime.date.today().isoformat()}, {info.name}, {info.platform} {info.driver}, packets of {info.lanes}. Disagreements with the "
+        "oracle; in brackets where the rung makes no promise.\n",
+        f"| case | | rays | {' | '.join(context.rungs)} | naive | verdict |",
+        f"| --: | :-- | --: | {' | '.join('--:' for _ in context.rungs)} | --: | :-- |",
+    ]
+    for result in results:
+        outcome = result.outcome
+        cells = [str(result.case.number), result.case.title, f"{outcome.rays:,}" if outcome else "-"]
+        cells += [_count(result, rung) for rung in context.rungs]
+        cells += [f"{outcome.naive:,}" if outcome else "-", "**FAIL**" if result.failures(context.rungs) else "pass"]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
 
 
 def _print(results: list[Result], context: Context) -> None:
