@@ -42,8 +42,8 @@ class ObjectStats:
 class RunStats:
     """One run from scene text to picture. Times are seconds of wall time.
 
-    read_s, build_s, upload_s, compile_s, render_s, write_s : reading the scene, all trees, filling buffers, composing and building the kernels,
-        tracing and shading with the transfer of the picture, writing the picture
+    read_s, build_s, upload_s, compile_s, render_s, write_s : reading the scene, all trees, filling buffers, composing and building
+        the kernels, tracing and shading with the transfer of the picture, writing the picture
     count_s : the second pass that counts, which no other time contains
     total_s : from the start of the command to the written picture, without `count_s`; from Python, from `render` to the picture
     ray_counts : rays traced by kind (see RAY_KINDS), None unless counted

@@ -25,7 +25,7 @@ _BEGIN, _END = "<!-- verify:begin -->", "<!-- verify:end -->"
 @click.option("--case", "numbers", type=click.IntRange(min=1), multiple=True, metavar="N", help="Run this case alone; may be repeated.")
 @click.option("--json", "json_path", metavar="FILE", help="Write all results as JSON too; - for standard output, instead of the table.")
 @click.option(
-    "--markdown", "page", metavar="FILE", help="Write the table as Markdown too, between the marks of a page that has <!-- verify:begin -->."
+    "--markdown", "page", metavar="FILE", help="Write the table as Markdown too; into the place that <!-- verify:begin --> marks, if any."
 )
 @click.option("--device", metavar="NAME", help="Part of the name of a device that `clrt devices` lists.")
 @click.option("--quiet", is_flag=True, help="No table and no progress: broken promises and the exit code only.")

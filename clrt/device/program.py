@@ -83,8 +83,10 @@ def kernel_source(name: str) -> tuple[str, tuple[tuple[str, str, int], ...]]:
 
 def _structs(features: Features, precision: Precision, entry: str) -> str:
     real = precision.real
-    names = [("Triangle", layout.triangle(real)), ("EdgePlanes", layout.edge_planes(real)), ("Object", layout.object_record(real)),
-             ("Surface", layout.surface(real)), ("Material", material_dtype(features, precision)), ("Frame", frame_dtype(features, precision))]  # fmt: skip
+    names = [
+        ("Triangle", layout.triangle(real)), ("EdgePlanes", layout.edge_planes(real)), ("Object", layout.object_record(real)),
+        ("Surface", layout.surface(real)), ("Material", material_dtype(features, precision)), ("Frame", frame_dtype(features, precision)),
+    ]  # fmt: skip
     declared = " ".join(declaration for f in features.active for _, declaration in f.parameters)
     names += [(name, make(real)) for name, make in (("Light", layout.light), ("Sphere", layout.sphere)) if f" {name} " in declared]
     if entry == "cast":
