@@ -72,6 +72,15 @@ def test_counts_are_those_of_exact_arithmetic(casters: dict[str, tuple[clrt.RayC
     assert (caster.count_hits(*rays, t_min=-np.inf) == exact.count_hits(tri, *rays, t_min=-np.inf)).all()
 
 
+@pytest.mark.parametrize("exponent", [10, 20, 52, 80, 100])
+def test_origins_far_away_see_what_exact_arithmetic_says(casters: dict[str, tuple[clrt.RayCaster, Array]], exponent: int) -> None:
+    """Along -y from 2^exponent times the mesh's size at the corners of a lattice: float32 has no digit of the mesh left."""
+    caster, tri = casters["grid on a lattice"]
+    origins = points(np.random.default_rng(14), tri, 150, "corner")
+    origins[:, 1] = 2.0**exponent
+    assert wrong(caster, tri, (origins, np.tile([0.0, -1.0, 0.0], (150, 1)))) == 0
+
+
 def exact_record(corners: Array, origin: Array, direction: Array) -> list[F]:
     """t, u, v of the plane's crossing (Cramer's rule) in rational numbers."""
     a, b, c = ([F(x) for x in p] for p in corners.astype(np.float64).tolist())
