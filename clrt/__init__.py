@@ -13,7 +13,7 @@ from collections.abc import Callable
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from clrt.errors import ClrtError, DeviceError, LimitError, MeshError, SceneError
+from clrt.errors import ClrtError, DeviceError, LimitError, MeshError, RayError, SceneError
 
 if TYPE_CHECKING:
     from clrt.device.context import DeviceInfo
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
-    "ClrtError", "DeviceError", "Image", "LimitError", "MeshError", "ObjectStats", "RayCaster", "RunStats", "Scene", "SceneError",
+    "ClrtError", "DeviceError", "Image", "LimitError", "MeshError", "ObjectStats", "RayCaster", "RayError", "RunStats", "Scene", "SceneError",
     "devices", "load", "render",
 ]  # fmt: skip
 

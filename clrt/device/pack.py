@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from clrt.device import layout
 from clrt.device.program import MEDIA_DEPTH, frame_dtype, material_dtype
 from clrt.features import Features
-from clrt.kdtree.tree import LEAF, KdTree
+from clrt.kdtree.arrays import LEAF
+from clrt.kdtree.tree import KdTree
 from clrt.precision import Precision
 from clrt.scene.media import around_eye, ranks, refracting_materials
 from clrt.scene.model import MeshObject, Scene

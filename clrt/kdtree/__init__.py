@@ -15,11 +15,12 @@ from typing import Protocol
 from numpy.typing import ArrayLike
 
 from clrt.errors import LimitError
+from clrt.kdtree.arrays import LEAF
 from clrt.kdtree.brute import build_brute
 from clrt.kdtree.common import DEPTH_CAP, F64, Progress, checked_vertices, default_max_depth
 from clrt.kdtree.median import build_median
 from clrt.kdtree.sah import build_sah
-from clrt.kdtree.tree import LEAF, KdTree
+from clrt.kdtree.tree import KdTree
 
 __all__ = ["BASELINES", "BUILDERS", "DEPTH_CAP", "LEAF", "Builder", "KdTree", "build_tree", "default_max_depth"]
 

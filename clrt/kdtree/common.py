@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clrt.errors import MeshError
-from clrt.kdtree.tree import LEAF, KdTree
+from clrt.kdtree.arrays import LEAF
+from clrt.kdtree.tree import KdTree
 
 F32 = NDArray[np.float32]
 F64 = NDArray[np.float64]

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from clrt.kdtree.arrays import LEAF, TreeArrays
 from clrt.kdtree.overlap import F64, Bools, triangles_meet_boxes
-from clrt.kdtree.tree import LEAF, KdTree
 
 Ints = NDArray[np.int64]
 
@@ -29,7 +29,7 @@ DELTA = 2.0**-40
 STRAY = 2.0**-22
 
 
-def entry_keys(tree: KdTree, triangles: int) -> Ints:
+def entry_keys(tree: TreeArrays, triangles: int) -> Ints:
     """leaf * triangles + triangle of every entry of `indices`."""
     leaves = np.flatnonzero(tree.split_axis == LEAF)
     leaves = leaves[np.lexsort((tree.count[leaves], tree.child[leaves]))]
@@ -52,7 +52,7 @@ class _Pairs:
     either: Bools
 
 
-def check_coverage(tree: KdTree, vertices: F64) -> None:
+def check_coverage(tree: TreeArrays, vertices: F64) -> None:
     """Every triangle is in every leaf that it reaches."""
     n = len(vertices)
     delta = DELTA * np.abs(vertices).max(axis=(1, 2), initial=0)
@@ -81,7 +81,7 @@ def _has_entry(entries: Ints, keys: Ints) -> Bools:
     return np.asarray(entries[place] == keys) if len(entries) else np.zeros(len(keys), bool)
 
 
-def _follow(tree: KdTree, vertices: F64, delta: F64, pairs: _Pairs) -> _Pairs:
+def _follow(tree: TreeArrays, vertices: F64, delta: F64, pairs: _Pairs) -> _Pairs:
     """The pairs one level down; marks in `pairs` those that reach beyond the split to neither side."""
     inner = np.flatnonzero(tree.split_axis[pairs.node] != LEAF)
     triangle, node = pairs.triangle[inner], pairs.node[inner]
@@ -119,7 +119,7 @@ def _reaches(vertices: F64, triangle: Ints, margin: F64, lo: F64, hi: F64, cut: 
     return reaches
 
 
-def _missing_entry(tree: KdTree, depths: list[_Pairs], proved: list[Bools]) -> str:
+def _missing_entry(tree: TreeArrays, depths: list[_Pairs], proved: list[Bools]) -> str:
     """Follow the first unproved triangle down to a leaf that lacks it."""
     pair = int(np.flatnonzero(~proved[0])[0])
     for level, pairs in enumerate(depths):
@@ -131,7 +131,7 @@ def _missing_entry(tree: KdTree, depths: list[_Pairs], proved: list[Bools]) -> s
     return f"kd-tree: triangle {triangle} reaches into leaf {node}, {lo} to {hi}, and is not among its {tree.count[node]} triangles"
 
 
-def stray_references(tree: KdTree, vertices: F64) -> int:
+def stray_references(tree: TreeArrays, vertices: F64) -> int:
     """Entries whose triangle is surely away from its leaf."""
     if not tree.indices.size:
         return 0

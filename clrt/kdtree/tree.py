@@ -1,45 +1,18 @@
-"""A kd-tree over the triangles of one object: plain arrays, their proof, their statistics."""
+"""A kd-tree over the triangles of one object: its arrays with their proof and their statistics."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-LEAF = 3  #: the split_axis of a leaf
+from clrt.kdtree.arrays import LEAF, TreeArrays
+from clrt.kdtree.validate import validate
 
 TRAVERSAL_COST = 8.0  #: one step down the tree, in triangle tests, as packets of 16 rays have it
 
 
-@dataclass(frozen=True, eq=False)
-class KdTree:
-    """Nodes in breadth-first order; node 0 is the root; the two children of a node lie side by side.
-
-    lo, hi : (3,) float64, closed bounds of all triangles
-    split_axis : (m,) uint8; 0, 1, 2 for x, y, z; LEAF for a leaf
-    split_pos : (m,) float32; the plane of an inner node (rounded to float32 *before* triangles were sorted by it); 0 in a leaf
-    child : (m,) int32; inner node: index of its lower child, the upper one is child + 1; leaf: its first entry in `indices`
-    count : (m,) int32; leaf: number of its entries in `indices`; inner node: 0
-    indices : (r,) int32 triangle numbers, local to the object, leaf by leaf
-    depth : edges from the root to the deepest leaf (a lone leaf: 0)
-    builder : "sah" or "median"
-    """
-
-    lo: NDArray[np.float64]
-    hi: NDArray[np.float64]
-    split_axis: NDArray[np.uint8]
-    split_pos: NDArray[np.float32]
-    child: NDArray[np.int32]
-    count: NDArray[np.int32]
-    indices: NDArray[np.int32]
-    depth: int
-    builder: str
-
-    @property
-    def node_count(self) -> int:
-        """Inner nodes and leaves."""
-        return len(self.split_axis)
+class KdTree(TreeArrays):
+    """A tree with its proof and its statistics; the arrays are those of TreeArrays."""
 
     @property
     def leaf_count(self) -> int:
@@ -60,19 +33,6 @@ class KdTree:
     def mean_leaf_size(self) -> float:
         """Triangles in a leaf that has any; 0 without triangles."""
         return self.reference_count / max(self.leaf_count - self.empty_leaf_count, 1)
-
-    def cells(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The box of every node: lo, hi : (m, 3) float64."""
-        lo, hi = np.tile(self.lo, (self.node_count, 1)), np.tile(self.hi, (self.node_count, 1))
-        level = np.flatnonzero(self.split_axis[:1] != LEAF)
-        while level.size:
-            axis, plane, lower = self.split_axis[level], self.split_pos[level], self.child[level]
-            for bound in (lo, hi):
-                bound[lower] = bound[lower + 1] = bound[level]
-            hi[lower, axis] = lo[lower + 1, axis] = plane
-            children = np.stack([lower, lower + 1], axis=1).ravel()
-            level = children[self.split_axis[children] != LEAF]
-        return lo, hi
 
     def sah_cost(self, traversal_cost: float = TRAVERSAL_COST) -> float:
         """Expected cost of a random line through the bounds, in triangle tests: steps * traversal_cost + tests.
@@ -106,6 +66,4 @@ class KdTree:
 
         Returns the number of stray references: entries whose triangle is surely away from its leaf. They cost time, never a hit.
         """
-        from clrt.kdtree.validate import validate
-
         return validate(self, np.asarray(vertices, np.float64), max_depth)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from clrt.kdtree.arrays import LEAF, TreeArrays
 from clrt.kdtree.coverage import check_coverage, entry_keys, stray_references
 from clrt.kdtree.overlap import F64, Bools
-from clrt.kdtree.tree import LEAF, KdTree
 
 Ints = NDArray[np.int64]
 
 
-def validate(tree: KdTree, vertices: F64, max_depth: int | None = None) -> int:
+def validate(tree: TreeArrays, vertices: F64, max_depth: int | None = None) -> int:
     """Raise ValueError with the first fault found; return the number of stray references."""
     _check_arrays(tree, vertices)
     _check_structure(tree, max_depth)
@@ -29,7 +29,7 @@ def _require(holds: Bools | bool, message: str) -> None:
         raise ValueError("kd-tree: " + message.format(int(failing[0])))
 
 
-def _check_arrays(tree: KdTree, vertices: F64) -> None:
+def _check_arrays(tree: TreeArrays, vertices: F64) -> None:
     """Shapes, dtypes, and bounds that hold all triangles."""
     m = len(tree.split_axis)
     _require(m > 0, "no root node")
@@ -45,7 +45,7 @@ def _check_arrays(tree: KdTree, vertices: F64) -> None:
     _require(within, "triangle {0} is not within the bounds of the tree")
 
 
-def _check_structure(tree: KdTree, max_depth: int | None) -> None:
+def _check_structure(tree: TreeArrays, max_depth: int | None) -> None:
     """Children in breadth-first pairs, each node reached once, and the depth as stated."""
     _require(tree.split_axis <= LEAF, "node {0} has a split axis above 3")
     inner = np.flatnonzero(tree.split_axis != LEAF)
@@ -62,7 +62,7 @@ def _check_structure(tree: KdTree, max_depth: int | None) -> None:
     _require(max_depth is None or depth <= max_depth, f"depth {depth} is beyond the limit {max_depth}")
 
 
-def _levels(tree: KdTree) -> list[Ints]:
+def _levels(tree: TreeArrays) -> list[Ints]:
     """Node numbers of each depth."""
     levels = [np.zeros(1, np.int64)]
     while True:
@@ -72,7 +72,7 @@ def _levels(tree: KdTree) -> list[Ints]:
         levels.append((tree.child[inner].astype(np.int64)[:, None] + np.arange(2)).ravel())
 
 
-def _check_leaves(tree: KdTree, triangles: int) -> None:
+def _check_leaves(tree: TreeArrays, triangles: int) -> None:
     """Leaf ranges partition `indices`; entries are triangles, each at most once a leaf."""
     leaves = np.flatnonzero(tree.split_axis == LEAF)
     first, count = tree.child[leaves].astype(np.int64), tree.count[leaves].astype(np.int64)
@@ -91,7 +91,7 @@ def _check_leaves(tree: KdTree, triangles: int) -> None:
         _require(False, f"leaf {leaf} has triangle {triangle} twice")
 
 
-def _check_planes(tree: KdTree) -> None:
+def _check_planes(tree: TreeArrays) -> None:
     """Each split lies strictly inside the cell of its node."""
     lo, hi = tree.cells()
     node, axis = np.arange(len(lo)), np.where(tree.split_axis == LEAF, 0, tree.split_axis)
