@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from clrt.device import layout, program
+from clrt.device import kernel_cache, layout, program
 from clrt.device.context import open_device
 from clrt.device.pack import Packed, local_origin, pack
 from clrt.device.session import Buffers, StageCounter
@@ -78,6 +78,9 @@ class RayCaster:
         self._capacity = 0
         self._rays = 0
         self._counters: dict[str, int] | None = None
+        with kernel_cache.loading():  # the first launch is part of compiling
+            self.first_hit(np.zeros(3), np.ones(3))
+        self._rays, self._counters, self._stages = 0, None, None
 
     @property
     def first_prims(self) -> NDArray[np.int64]:

@@ -6,7 +6,7 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from clrt.device import pocl_cpu
+from clrt.device import kernel_cache, pocl_cpu
 from clrt.errors import DeviceError
 
 POCL = "Portable Computing Language"
@@ -47,6 +47,7 @@ def _handles() -> list[Any]:
     """Every device of every platform; CPU devices of PoCL first, other CPU devices next."""
     import pyopencl as cl
 
+    kernel_cache.choose_folder()
     try:
         platforms = cl.get_platforms()
     except cl.Error as error:

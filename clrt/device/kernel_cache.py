@@ -1,0 +1,83 @@
+"""PoCL's cache of compiled kernels: a folder of clrt's own, and what to do when an entry in it is broken.
+
+PoCL trusts its cache: an entry that was cut off (a full disk, a machine that went down) crashes each later process that loads it,
+without a word. So a mark stands in the folder while a program is loaded and launched for the first time; a mark left by a
+process that is gone means that it died there, and the folder is emptied before anything is loaded again.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+VARIABLE = "POCL_CACHE_DIR"
+_MARK = "clrt-loading-"
+
+
+def choose_folder() -> Path:
+    """The folder that PoCL will use, made if need be; to be called before the first OpenCL call of a process.
+
+    POCL_CACHE_DIR where it is set; else `clrt/pocl` in the user's cache folder, or, where that cannot be written, in a
+    temporary one that all processes of the user share.
+    """
+    if VARIABLE not in os.environ:
+        homes = (Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"), Path(tempfile.gettempdir()) / f"clrt-{os.getuid()}")
+        os.environ[VARIABLE] = str(next((h for h in (home / "clrt" / "pocl" for home in homes) if _writable(h)), homes[-1]))
+    return Path(os.environ[VARIABLE])
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK | os.X_OK)
+
+
+def clear() -> None:
+    """Empties PoCL's folder; what cannot be removed stays."""
+    folder = Path(os.environ.get(VARIABLE, ""))
+    if VARIABLE in os.environ and folder.is_dir():
+        for entry in folder.iterdir():
+            if entry.is_dir() and not entry.is_symlink():
+                shutil.rmtree(entry, ignore_errors=True)
+            elif not entry.name.startswith(_MARK):
+                with suppress(OSError):
+                    entry.unlink()
+
+
+def clear_if_one_died() -> bool:
+    """Empties the folder if a process died while it loaded from it and no other is loading now; whether it did."""
+    folder = Path(os.environ.get(VARIABLE, ""))
+    if VARIABLE not in os.environ or not folder.is_dir():
+        return False
+    marks = list(folder.glob(f"{_MARK}*"))
+    dead = [mark for mark in marks if not _alive(mark.name.removeprefix(_MARK))]
+    if not dead or len(dead) < len(marks):
+        return False
+    clear()
+    for mark in dead:
+        mark.unlink(missing_ok=True)
+    return True
+
+
+def _alive(process: str) -> bool:
+    return process.isdigit() and Path("/proc", process).exists()
+
+
+@contextmanager
+def loading() -> Iterator[None]:
+    """While programs are loaded and launched for the first time: leaves a mark behind if the process dies in it."""
+    clear_if_one_died()
+    mark = Path(os.environ.get(VARIABLE, tempfile.gettempdir())) / f"{_MARK}{os.getpid()}"
+    with suppress(OSError):
+        mark.touch()
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            mark.unlink(missing_ok=True)

@@ -1,0 +1,72 @@
+"""A broken entry of PoCL's cache costs at most one run, and says so or heals itself."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from clrt.device import kernel_cache
+from clrt.device.context import POCL, list_devices
+
+SCENE = "E 0 0 -1\nV 0 0 1\nF 45\nR 16 16\nL 5 5 -5\nM 1 0.5 0.2 0.2 0.8 0 1 0\nT -1 -1 2 1 -1 2 0 1 2\n"
+
+
+def _render(folder: Path) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {kernel_cache.VARIABLE: str(folder / "cache")}
+    command = [sys.executable, "-m", "clrt", str(folder / "scene.txt"), "-o", str(folder / "picture.ppm"), "--quiet"]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.parametrize("damaged", ["render.so", "program.bc"])
+@pytest.mark.parametrize("size", [0, 3000])
+def test_broken_entry_is_dropped_at_the_latest_by_the_next_run(tmp_path: Path, damaged: str, size: int) -> None:
+    if list_devices()[0].platform != POCL:
+        pytest.skip("the default device is not PoCL's")
+    (tmp_path / "scene.txt").write_text(SCENE)
+    assert _render(tmp_path).returncode == 0
+    good = (tmp_path / "picture.ppm").read_bytes()
+    files = [f for f in (tmp_path / "cache").rglob(damaged) if f.stat().st_size > 3000]
+    assert files, "the cache is laid out in another way than this test knows"
+    for file in files:
+        os.truncate(file, size)
+    (tmp_path / "picture.ppm").unlink()
+    if _render(tmp_path).returncode != 0:  # a broken library kills the process that loads it
+        assert _render(tmp_path).returncode == 0
+    assert (tmp_path / "picture.ppm").read_bytes() == good
+    assert not list((tmp_path / "cache").glob("clrt-loading-*"))
+
+
+def test_mark_of_a_dead_process_empties_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
+    (tmp_path / "AB").mkdir()
+    (tmp_path / "AB" / "render.so").write_bytes(b"cut off")
+    (tmp_path / "clrt-loading-999999999").touch()
+    with kernel_cache.loading():
+        assert [p.name for p in tmp_path.iterdir()] == [f"clrt-loading-{os.getpid()}"]
+    assert not list(tmp_path.iterdir())
+
+
+def test_folder_stays_while_another_process_loads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
+    (tmp_path / "AB").mkdir()
+    (tmp_path / "clrt-loading-999999999").touch()
+    (tmp_path / f"clrt-loading-{os.getppid()}").touch()
+    with kernel_cache.loading():
+        assert (tmp_path / "AB").is_dir()
+
+
+def test_folder_is_the_users_or_a_temporary_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(kernel_cache.VARIABLE, raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "mine"))
+    assert kernel_cache.choose_folder() == tmp_path / "mine" / "clrt" / "pocl"
+    monkeypatch.delenv(kernel_cache.VARIABLE)
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr(kernel_cache.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    assert str(kernel_cache.choose_folder()).startswith(str(tmp_path / "temporary"))
+    monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path / "chosen"))
+    assert kernel_cache.choose_folder() == tmp_path / "chosen"
