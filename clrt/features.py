@@ -77,6 +77,11 @@ def _bounce_caller(scene: Scene) -> int | None:
     return min(lines, default=None)
 
 
+def _fresnel_caller(scene: Scene) -> int | None:
+    lines = [m.fresnel_line for m in _used_materials(scene) if m.fresnel and m.refract > 0.0]
+    return min(lines) if lines and scene.depth > 0 else None
+
+
 def _smooth_caller(scene: Scene) -> int | None:
     return min((o.line for o in scene.objects if o.vertex_normals is not None), default=None)
 
@@ -101,6 +106,7 @@ FEATURES: tuple[Feature, ...] = (
         frame=(("light_count", np.int32, lambda scene: len(scene.lights)),),
         parameters=(("lights", "global const Light *lights"),),
     ),
+    Feature("fresnel", _fresnel_caller, "fresnel.cl", material=(("fresnel", np.int32),), rays=("fresnel",)),
     Feature(
         "refraction",
         _material_caller("refract"),

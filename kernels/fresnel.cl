@@ -1,5 +1,6 @@
-// Provides: fresnel_dielectric, fresnel_transmitted: the shares of unpolarised light that a smooth dielectric reflects and lets through.
-// Needs: lanes.cl.  Reads: nothing.
+// Provides: fresnel_dielectric, fresnel_transmitted: the shares of unpolarised light that a polished dielectric reflects and lets through;
+//           fresnel_split: what these make of the weights of a hit.
+// Needs: lanes.cl; fresnel_split: refraction.cl.  Reads: nothing.
 //
 // With a = n1 cos i, b = n2 cos t, D = n2^2 - n1^2 and Snell's law n1 sin i = n2 sin t:
 //     b^2 = a^2 + D                                           no root of a difference of sines
@@ -60,3 +61,45 @@ static inline real fresnel_transmitted(real cos_i, real n1, real n2) {
     const real a = n1 * cos_i, b = sqrt(b2), across = a + b, along = n2 * n2 * cos_i + n1 * b;
     return fmin(R(2.0) * a * b * (R(1.0) / (across * across) + (n2 / along) * (n2 / along)), R(1.0));
 }
+
+//@hook refraction_parts
+// The cosine of incidence on the normal that refraction_turn has used: the shading one, or the true one where that did not serve.
+static inline real fresnel_cosine(const real *d, const real *shading, const real *surface, real ratio) {
+    real turned[3];
+    const int passes = refraction_snell(d, shading, ratio, turned);
+    const int serves = passes > 0 && turned[0] * surface[0] + turned[1] * surface[1] + turned[2] * surface[2] < R(0.0);
+    const real *n = serves ? shading : surface;
+    return clamp(-(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]), R(0.0), R(1.0));
+}
+
+// Leaves of `passed` what goes through and gives what is reflected, for lanes of such materials; others keep theirs, and get 0.
+static __attribute__((noinline)) void fresnel_split(global const Material *materials, global const int *media, const Rays *rays,
+                                                    const Hit *hit, const Media *before, const Media *behind, real_n *passed,
+                                                    real_n *reflected) {
+    real d[3][LANES], n[3][LANES], g[3][LANES], through[LANES], back[LANES];
+    for (int a = 0; a < 3; a++) {
+        store_lanes(rays->direction[a], d[a]);
+        store_lanes(hit->normal[a], n[a]);
+        store_lanes(hit->geometric[a], g[a]);
+    }
+    store_lanes(*passed, through);
+    for (int k = 0; k < LANES; k++) {
+        back[k] = R(0.0);
+        if (!(through[k] > R(0.0)) || !materials[hit->material[k]].fresnel) continue;
+        const real from = media_index(before, media, k), to = media_index(behind, media, k);
+        const real incoming[3] = {d[0][k], d[1][k], d[2][k]}, shading[3] = {n[0][k], n[1][k], n[2][k]};
+        const real surface[3] = {g[0][k], g[1][k], g[2][k]};
+        const real cos_i = fresnel_cosine(incoming, shading, surface, from / to);
+        back[k] = through[k] * fresnel_dielectric(cos_i, from, to);
+        through[k] *= fresnel_transmitted(cos_i, from, to);
+    }
+    *passed = load_lanes(through);
+    *reflected = load_lanes(back);
+}
+//@end
+//@hook refraction_weights
+            real_n glint;
+            fresnel_split(materials, media, &rays, &hit, &current.media, &behind, &passed, &glint);
+            //@counting count_rays(counters, COUNT_FRESNEL, is_greater(glint * weight, (real_n)0));
+            reflected += glint;
+//@end

@@ -54,6 +54,12 @@ def box(low: ArrayLike, high: ArrayLike) -> FloatArray:
     return np.concatenate([quad(*p[list(f)]) for f in faces])
 
 
+def prism_mesh() -> MeshObject:
+    """A right-angled prism: the leg z = 0 is met straight along +z, the slanted face behind it at 45 degrees."""
+    p = np.array([[x, y, z] for x in (-1.0, 1.0) for y, z in ((-1, 0), (1, 0), (-1, 2))])
+    return mesh(np.array([*p[[[0, 1, 2], [3, 5, 4]]], *quad(*p[[0, 1, 4, 3]]), *quad(*p[[0, 2, 5, 3]]), *quad(*p[[1, 2, 5, 4]])]))
+
+
 def globe(rings: int = 8, radius: float = 1.0, center: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
     """A closed sphere of triangles, poles along y; neighbours share their vertices to the bit."""
     theta, phi = np.linspace(0.0, np.pi, rings + 1), np.linspace(0.0, 2.0 * np.pi, 2 * rings + 1)

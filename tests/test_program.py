@@ -23,6 +23,7 @@ WORDS = {
     "smooth": ("smooth", "corner_normals"),
     "shadows": ("shadow", "light_planes"),
     "direct light": ("direct_light", "diffuse *", "pow("),
+    "fresnel": ("fresnel",),
     "refraction": ("refract", "ior", "media"),
     "mirror": ("mirror", "reflect;"),
     "bounce": ("bounce",),
@@ -44,7 +45,7 @@ def test_source_without_an_effect_holds_none_of_its_names(feature: Feature) -> N
     others = _features(*(f.name for f in FEATURES if f.name != feature.name))
     with_it = program.compose(ALL, rung("watertight"), 16, SHAPE)
     assert _traces(feature, with_it), "the words looked for must occur where the effect is on"
-    dependents = {"direct light": ("shadows",), "bounce": ("mirror", "refraction")}.get(feature.name, ())
+    dependents = {"direct light": ("shadows",), "bounce": ("mirror", "refraction", "fresnel"), "refraction": ("fresnel",)}.get(feature.name, ())
     left = Features(tuple(pair for pair in others.lines if pair[0] not in dependents))
     assert _traces(feature, program.compose(left, rung("watertight"), 16, SHAPE)) == []
 
@@ -83,6 +84,7 @@ def test_line_directives_are_true(device: Device) -> None:
 @pytest.mark.parametrize("names", list(itertools.combinations([f.name for f in FEATURES if f.name != "bounce"], 2)))
 def test_pairs_of_effects_compile_for_any_width(device: Device, names: tuple[str, str]) -> None:
     wanted = {*names}
+    wanted |= {"refraction"} if "fresnel" in wanted else set()
     wanted |= {"bounce"} if {"mirror", "refraction"} & wanted else set()
     wanted |= {"direct light"} if "shadows" in wanted else set()
     lanes = {0: 16, 1: 8, 2: 4, 3: 1}[sum(map(ord, "".join(names))) % 4]

@@ -232,7 +232,7 @@ def test_word_takes_quoted_text_and_keys(poster: list[WordCall]) -> None:
         ("poster a.png raduis=1", '8:14: error: poster has no key "raduis"; did you mean "radius"? (its keys: radius, title)'),
         ('poster "a.png', '8:8: error: expected a second double quote after ""a.png" (file)'),
         ('poster ""', "8:8: error: expected a text (file), found nothing"),
-        ("postre a.png", '8:1: error: unknown word "postre"; did you mean "poster"? (the words: background, depth, poster)'),
+        ("postre a.png", '8:1: error: unknown word "postre"; did you mean "poster"? (the words: background, depth, fresnel, poster)'),
     ],
 )
 def test_word_that_does_not_fit_its_grammar(line: str, expected: str) -> None:

@@ -18,6 +18,7 @@ BoolArray = NDArray[np.bool_]
 Walls = Sequence[tuple[IndexArray, IndexArray]]
 
 STACK_SIZE = 8  #: dielectrics a ray can be inside of at once
+NEARLY_TOTAL = 0.1  #: cosine of refraction below which Fresnel's share changes steeply
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,13 +111,17 @@ def bounces(
         behind = behind.crossed_at(rows, object_id, materials.ior[prims.material[prim]], rank[object_id])
     glass = materials.refract[ids] > 0.0
     ratio = np.divide(stack.index, behind.index, where=glass, out=np.ones(len(ids)))
-    refracted, k, flat_margin, stretch = _refract(surface, ratio)
+    refracted, k, flat_margin, stretch, cos_in = _refract(surface, ratio)
     total = glass & (k < 0.0)
     refract_weight = np.where(glass & ~total, materials.refract[ids], 0.0)
     reflect_weight = materials.reflect[ids] + np.where(total, materials.refract[ids], 0.0)
+    split, steep_margin = _fresnel(surface, cos_in, k, stack.index, behind.index, glass & ~total & (materials.fresnel[ids] > 0.0))
+    reflect_weight += split * refract_weight
+    refract_weight *= 1.0 - split
     reflected, above_margin = _reflect(surface)
     margin = np.where(reflect_weight != 0.0, above_margin, np.inf)
     margin = np.minimum(margin, np.where(glass, np.minimum(np.abs(k) / surface.normal_err, flat_margin), np.inf))
+    margin = np.minimum(margin, steep_margin)
     turn = surface.curvature * surface.pos_err
     reflect_err = np.stack([_across(surface, reflected), surface.dir_err + 2.0 * turn])
     refract_err = np.stack([_across(surface, refracted), surface.dir_err * np.maximum(stretch, 1.0) + turn * np.abs(stretch - 1.0)])
@@ -138,9 +143,9 @@ def _reflect(surface: Surface) -> tuple[FloatArray, FloatArray]:
     return _unit(np.where((above > 0.0)[:, None], smooth, flat)), margin
 
 
-def _refract(surface: Surface, ratio: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def _refract(surface: Surface, ratio: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Refracted directions, k = cos^2 of the refracted angle (negative: total reflection), the margin of the choice of normal,
-    and the derivative of the refracted by the incident angle.
+    the derivative of the refracted by the incident angle, and the cosine of the latter.
 
     About the shading normal; about the geometric one where the shading normal faces away from the viewer, or where the refracted ray
     would stay on the viewer's side.
@@ -154,7 +159,28 @@ def _refract(surface: Surface, ratio: FloatArray) -> tuple[FloatArray, FloatArra
     k = np.where(use_geo, k_geo, k_shade)
     cos_in = np.abs(np.where(use_geo, dot(surface.view, surface.n_geo), facing))
     stretch = ratio * cos_in / np.sqrt(np.maximum(k, 1e-6))
-    return np.where(use_geo[:, None], about_geo, about_shade), k, margin, stretch
+    return np.where(use_geo[:, None], about_geo, about_shade), k, margin, stretch, cos_in
+
+
+def _fresnel(
+    surface: Surface, cos_in: FloatArray, k: FloatArray, before: FloatArray, behind: FloatArray, wanted: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """The share of unpolarised light that is reflected (m,), the mean of both polarisations; 0 where not wanted.
+
+    before, behind : indices n1, n2; k : cos^2 of the refracted angle
+    And its margin: near the critical angle the share is 1 - s sqrt(k), with s = 2 (n1 / n2 + n2 / n1) / cos i, so that an error e of k
+    changes it by s e / (2 sqrt(k)): by 1e-4 where e is a 100th of this margin.
+    """
+    share, margin = np.zeros(len(k)), np.full(len(k), np.inf)
+    rows = np.flatnonzero(wanted & (before != behind))
+    n1, n2 = before[rows], behind[rows]
+    cos_i, cos_t = cos_in[rows], np.sqrt(k[rows])
+    s = (n1 * cos_i - n2 * cos_t) / (n1 * cos_i + n2 * cos_t)
+    p = (n2 * cos_i - n1 * cos_t) / (n2 * cos_i + n1 * cos_t)
+    share[rows] = (s**2 + p**2) / 2.0
+    slope = (n1 / n2 + n2 / n1) / np.maximum(cos_i * cos_t, 1e-30)
+    margin[rows] = np.where((n1 > n2) & (cos_t < NEARLY_TOTAL), 1e-2 / (slope * surface.normal_err[rows]), np.inf)
+    return share, margin
 
 
 def _snell(surface: Surface, normal: FloatArray, ratio: FloatArray) -> tuple[FloatArray, FloatArray]:

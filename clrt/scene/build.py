@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from bisect import bisect_left
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -80,10 +81,33 @@ def _check_materials(found: Declarations, faults: Faults) -> None:
 
 def _check_words(found: Declarations, faults: Faults) -> None:
     first: dict[str, int] = {}
+    _check_glass_words(found, faults)
     for call in found.words:
+        if WORDS[call.name].of_glass:
+            continue
         if call.name in first and WORDS[call.name].once:
             faults.add(call.line, call.column, f"a second {call.name} line; the first is line {first[call.name]}, remove one of the two")
         first.setdefault(call.name, call.line)
+
+
+def _check_glass_words(found: Declarations, faults: Faults) -> None:
+    """Words of glass stand below a material with Refract > 0, each once a material."""
+    materials, glass = found.lines_of("M").tolist(), found.get("M", 10)
+    refract = dict(zip(glass.lines.tolist(), glass.values[:, 8].tolist(), strict=True)) | dict.fromkeys(found.broken.get("M", []), 1.0)
+    first: dict[tuple[str, int], int] = {}
+    for call in (c for c in found.words if WORDS[c.name].of_glass):
+        above = bisect_left(materials, call.line)
+        material = materials[above - 1] if above else 0
+        if not above:
+            fault = f'{call.name} before any material; add a line of glass above it, such as "M 1 1 1 0 0 0.5 60 0 1 1.5"'
+        elif not refract.get(material, 0.0) > 0.0:
+            fault = f"{call.name} needs a material that light passes through; give the M of line {material} 10 numbers, Refract above 0"
+        elif (call.name, material) in first:
+            fault = f"a second {call.name} of one material; the first is line {first[call.name, material]}, remove one of the two"
+        else:
+            first[call.name, material] = call.line
+            continue
+        faults.add(call.line, call.column, fault)
 
 
 def _in_order(found: Declarations, letter: str) -> list[tuple[int, list[float]]]:

@@ -73,7 +73,11 @@ class Camera:
 
 @dataclass(frozen=True)
 class Material:
-    """The homework's material. `line` is where the scene text defines it (0: not from a text)."""
+    """The homework's material. `line` is where the scene text defines it (0: not from a text).
+
+    fresnel : Fresnel's equations split `refract` between the reflected and the refracted ray; `reflect` is 0 then
+    fresnel_line : the line that says so (0: none)
+    """
 
     color: tuple[float, float, float]
     ambient: float
@@ -84,6 +88,8 @@ class Material:
     refract: float = 0.0
     ior: float = 1.0
     line: int = 0
+    fresnel: bool = False
+    fresnel_line: int = 0
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from clrt.scene.faults import Faults, did_you_mean, shown
 from clrt.scene.grammar import Field, color_fields
@@ -65,6 +65,7 @@ class Word:
     apply : what the line does to the draft
     keys : written key=value in any order, each with the default of a line that leaves it out
     once : a second line with the word is an error
+    of_glass : belongs to the material above it, which has to have Refract > 0; `once` then means once a material
     """
 
     positional: tuple[Field | Text, ...]
@@ -72,6 +73,7 @@ class Word:
     apply: Callable[[Draft, WordCall], None]
     keys: tuple[tuple[Field | Text, Value], ...] = ()
     once: bool = True
+    of_glass: bool = False
 
 _BACKGROUND = color_fields()
 _DEPTH = Field("depth", low=0.0, high=float(GREATEST_DEPTH), whole=True)
@@ -85,9 +87,21 @@ def _set_depth(draft: Draft, call: WordCall) -> None:
     draft.depth = int(call.number("depth"))
 
 
+def _material_above(draft: Draft, call: WordCall) -> int:
+    """Index of the material that a line belongs to: the last above it."""
+    return max(i for i, material in enumerate(draft.materials) if material.line < call.line)
+
+
+def _set_fresnel(draft: Draft, call: WordCall) -> None:
+    i = _material_above(draft, call)
+    total = draft.materials[i].reflect + draft.materials[i].refract
+    draft.materials[i] = replace(draft.materials[i], reflect=0.0, refract=total, fresnel=True, fresnel_line=call.line)
+
+
 WORDS: dict[str, Word] = {
     "background": Word(_BACKGROUND, "background 0.2 0.3 0.5", _set_background),
     "depth": Word((_DEPTH,), "depth 5", _set_depth),
+    "fresnel": Word((), "fresnel", _set_fresnel, of_glass=True),
 }
 
 
