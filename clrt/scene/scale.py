@@ -1,0 +1,54 @@
+"""A scene in other units: all its lengths times a power of two, which rounds nothing.
+
+Tests of rays multiply three lengths in float32, whose range ends near 2^127: a scene that is told in micrometres or in
+kilometres is brought to a size near 1 first. The picture is the same, whatever the unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from clrt.scene.model import FloatArray, PointLight, Scene, SpotLight
+
+_ORDINARY = 20  #: scenes between 2^-20 and 2^20 stay as they are: their products stay within 2^-60 and 2^60
+
+
+def size_exponent(scene: Scene) -> int:
+    """e with the size of the scene in [2^(e-1), 2^e): the longest side of its triangles' boxes or the greatest radius."""
+    sizes = [float((hi / 2.0 - lo / 2.0).max()) * 2.0 for lo, hi in _boxes(scene)]
+    sizes += [float(scene.spheres.radii.max())] if len(scene.spheres) else []
+    largest = max(sizes, default=0.0)
+    return int(np.frexp(largest)[1]) if 0.0 < largest < np.inf else 0
+
+
+def _boxes(scene: Scene) -> Iterator[tuple[FloatArray, FloatArray]]:
+    return ((o.vertices.min((0, 1)), o.vertices.max((0, 1))) for o in scene.objects if len(o))
+
+
+def at_working_size(scene: Scene) -> Scene:
+    """The scene itself, or, where its size would overflow or underflow float32, the same scene at a size near 1."""
+    exponent = size_exponent(scene)
+    return scene if abs(exponent) <= _ORDINARY else scaled(scene, -exponent)
+
+
+def scaled(scene: Scene, exponent: int) -> Scene:
+    """All lengths of `scene` times 2^exponent. Directions, angles, colours and indices stay."""
+
+    def times(values: FloatArray) -> FloatArray:
+        return np.asarray(np.ldexp(values, exponent))
+
+    def moved(light: PointLight | SpotLight) -> PointLight | SpotLight:
+        x, y, z = times(np.asarray(light.position, np.float64)).tolist()
+        return replace(light, position=(x, y, z))
+
+    return replace(
+        scene,
+        camera=replace(scene.camera, eye=times(scene.camera.eye)),
+        objects=tuple(replace(o, vertices=times(o.vertices)) for o in scene.objects),
+        spheres=replace(scene.spheres, centers=times(scene.spheres.centers), radii=times(scene.spheres.radii)),
+        lights=tuple(light for light in map(moved, scene.lights) if isinstance(light, PointLight)),
+        spots=tuple(light for light in map(moved, scene.spots) if isinstance(light, SpotLight)),
+    )
