@@ -9,6 +9,7 @@ from typing import Any
 _TIMES_EMBREEX = 2.0
 _TESTS_PER_RAY = {"rabbit": 40.0, "monkey": 30.0}
 _COMMAND_S = 2.0
+_TIMES_BRUTE = 300.0
 _TIMES_FAST = {"watertight": 1.10, "exact": 1.20, "double": 2.6}
 #: depth and nodes of the report's trees; its splitter leaves open what a corner in the plane is, so ours need only be near
 _REPORT_TREES = {"monkey": (9, 138), "rabbit": (17, 18_094)}
@@ -36,6 +37,7 @@ def marks_of(results: dict[str, Any]) -> list[Mark]:
     marks = list(_versus(results, reason or generated.get("rabbit", "")))
     for row in results["tests"]:
         marks += _tests(row, reason or generated.get(row["role"], ""))
+    marks += _brute(results, reason or generated.get("rabbit", ""))
     marks += _ladder(results, reason or generated.get("rabbit", ""))
     command = results["command"]
     marks.append(_mark(
@@ -63,6 +65,14 @@ def _versus(results: dict[str, Any], reason: str) -> Iterator[Mark]:
         else:
             rate = versus["rates"]["clrt"][kind]
             yield Mark(what, target, f"{rate:.1f} million a second", None, "no verdict: embreex is not installed")
+
+
+def _brute(results: dict[str, Any], reason: str) -> Iterator[Mark]:
+    rabbit = next(scene["name"] for scene in results["scenes"] if scene["role"] == "rabbit")
+    for row in results["trees"]:
+        if row["scene"] == rabbit and row["tree"] == "sah":
+            what, ratio = f"kd-tree against brute force, {rabbit}, {row['size']} squared", row["speed_up"]
+            yield _mark(what, f"over {_TIMES_BRUTE:.0f} times", f"{ratio:.0f} times", ratio > _TIMES_BRUTE, reason)
 
 
 def _ladder(results: dict[str, Any], reason: str) -> Iterator[Mark]:

@@ -32,7 +32,7 @@ class Plan:
     sample : of the picture from which brute force is reckoned where a whole one would take it too long. Not too small: in a packet of
         neighbouring pixels that lie far apart, fewer rays go the same way, and brute force looks slower than it is
     brute_limit : pixels times triangles beyond which it takes too long
-    brute_count_size : of the picture that its tests are counted in, at most; the counters of a launch have 32 bits
+    brute_count_size : of the picture that its tests are counted in, at most: counting takes longer than tracing
     versus_size, count_size, command_size : of the other measurements
     ladder_rounds : of the rungs' pictures, whose times lie so near each other that they want more
     """
