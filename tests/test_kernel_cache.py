@@ -70,3 +70,41 @@ def test_folder_is_the_users_or_a_temporary_one(tmp_path: Path, monkeypatch: pyt
     assert str(kernel_cache.choose_folder()).startswith(str(tmp_path / "temporary"))
     monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path / "chosen"))
     assert kernel_cache.choose_folder() == tmp_path / "chosen"
+
+
+def test_temporary_folder_that_is_not_the_users_alone_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(kernel_cache.VARIABLE, raising=False)
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr(kernel_cache.tempfile, "tempdir", str(tmp_path))
+    planted = tmp_path / f"clrt-{os.getuid()}"
+    planted.mkdir()
+    planted.chmod(0o777)
+    chosen = kernel_cache.choose_folder()
+    assert tmp_path in chosen.parents
+    assert planted not in chosen.parents
+    assert not list(planted.iterdir())
+
+
+@pytest.mark.parametrize("variable", ["HOME", "XDG_CACHE_HOME"])
+def test_unwritable_cache_folder_is_no_obstacle(tmp_path: Path, variable: str) -> None:
+    # A folder below a file can be made by nobody, not even by root.
+    (tmp_path / "file").write_text("no folder")
+    unset = {kernel_cache.VARIABLE, "XDG_CACHE_HOME"}
+    environment = {k: v for k, v in os.environ.items() if k not in unset} | {variable: str(tmp_path / "file"), "TMPDIR": str(tmp_path)}
+    command = [sys.executable, "-m", "clrt", "devices"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / f"clrt-{os.getuid()}" / "clrt" / "pocl").is_dir()
+
+
+def test_unwritable_folder_of_the_variable_is_named(tmp_path: Path) -> None:
+    if any(d.platform != POCL for d in list_devices()):
+        pytest.skip("another platform has a device without this folder")
+    (tmp_path / "file").write_text("no folder")
+    folder = tmp_path / "file" / "cache"
+    command = [sys.executable, "-m", "clrt", "devices"]
+    done = subprocess.run(command, env=os.environ | {kernel_cache.VARIABLE: str(folder)}, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert f"PoCL cannot write to POCL_CACHE_DIR={folder}" in done.stderr
+    assert len(done.stderr.splitlines()) == 1

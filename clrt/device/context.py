@@ -43,15 +43,22 @@ def lanes_of(native_float_width: int) -> int:
     return next((n for n in (16, 8, 4) if n <= native_float_width), 1)
 
 
+def _none_found() -> str:
+    folder = kernel_cache.unwritable_folder()
+    if folder is None:
+        return INSTALL_HINT
+    return f"no OpenCL device found: PoCL cannot write to {kernel_cache.VARIABLE}={folder}; name another folder there, or unset it"
+
+
 def _handles() -> list[Any]:
     """Every device of every platform; CPU devices of PoCL first, other CPU devices next."""
+    kernel_cache.choose_folder()
     import pyopencl as cl
 
-    kernel_cache.choose_folder()
     try:
         platforms = cl.get_platforms()
     except cl.Error as error:
-        raise DeviceError(INSTALL_HINT) from error
+        raise DeviceError(_none_found()) from error
     handles = []
     for platform in platforms:
         try:
@@ -59,7 +66,7 @@ def _handles() -> list[Any]:
         except cl.Error:  # a platform without a device
             continue
     if not handles:
-        raise DeviceError(INSTALL_HINT)
+        raise DeviceError(_none_found())
 
     def rank(handle: Any) -> tuple[bool, bool]:
         return not handle.type & cl.device_type.CPU, handle.platform.name != POCL

@@ -7,8 +7,10 @@ process that is gone means that it died there, and the folder is emptied before 
 
 from __future__ import annotations
 
+import atexit
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -19,15 +21,40 @@ _MARK = "clrt-loading-"
 
 
 def choose_folder() -> Path:
-    """The folder that PoCL will use, made if need be; to be called before the first OpenCL call of a process.
+    """The folder that PoCL will use, made if need be; to be called before pyopencl is imported.
 
     POCL_CACHE_DIR where it is set; else `clrt/pocl` in the user's cache folder, or, where that cannot be written, in a
-    temporary one that all processes of the user share.
+    temporary one that all processes of the user share. In that case XDG_CACHE_HOME becomes the temporary one, too:
+    pyopencl cannot be imported where it cannot keep files of its own.
     """
-    if VARIABLE not in os.environ:
-        homes = (Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"), Path(tempfile.gettempdir()) / f"clrt-{os.getuid()}")
-        os.environ[VARIABLE] = str(next((h for h in (home / "clrt" / "pocl" for home in homes) if _writable(h)), homes[-1]))
-    return Path(os.environ[VARIABLE])
+    home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+    if not (_writable(home / "clrt" / "pocl") and _writable(home / "pytools")):
+        home = _temporary_home()
+        os.environ["XDG_CACHE_HOME"] = str(home)
+    if not os.environ.get(VARIABLE):
+        os.environ[VARIABLE] = str(home / "clrt" / "pocl")
+    folder = Path(os.environ[VARIABLE])
+    _writable(folder)
+    return folder
+
+
+def unwritable_folder() -> str | None:
+    """The value of POCL_CACHE_DIR where PoCL cannot write there, and so has no device."""
+    folder = os.environ.get(VARIABLE)
+    return folder if folder and not _writable(Path(folder)) else None
+
+
+def _temporary_home() -> Path:
+    """The user's own folder for temporary caches: libraries are loaded from it, so it is never one that somebody else made."""
+    shared = Path(tempfile.gettempdir()) / f"clrt-{os.getuid()}"
+    with suppress(OSError):
+        shared.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = shared.lstat()
+        if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022:
+            return shared
+    own = tempfile.mkdtemp(prefix="clrt-")
+    atexit.register(shutil.rmtree, own, ignore_errors=True)
+    return Path(own)
 
 
 def _writable(folder: Path) -> bool:
