@@ -1,5 +1,5 @@
 """`python -m clrt`, the same as `clrt`."""
 
-from clrt.cli.main import main
+from clrt.cli.entry import main
 
 main()

@@ -47,7 +47,8 @@ class FakeRenderer(ModuleType):
         counted = arguments["count"]
         objects = [ObjectStats(o.name, len(o), 1, 1, len(o), 0, 0.001, 1.25 if counted else None) for o in scene.objects]
         counts = {"primary": width * height, "shadow": 5, "mirror": 0, "refracted": 0} if counted else None
-        stats = RunStats(scene.source, width, height, arguments["tree"], "Imaginary CPU", "watertight", ["shadows"], objects, counts)
+        stats = RunStats(scene.source, width, height, arguments["tree"], "Imaginary CPU", "watertight")
+        stats.effects, stats.objects, stats.ray_counts = ["shadows"], objects, counts
         stats.render_s, stats.build_s, stats.compile_s, stats.count_s = 0.5, 0.001, 0.25, 0.125
         return Image(np.full((height, width, 3), self.level, np.float32), stats)
 

@@ -17,6 +17,8 @@ import pytest
 
 SCENE = "E 0 0 -1\nV 0 0 1\nF 45\nR 64 48\nL 5 5 -5\nM 0.5 0.5 1 0.1 0.9 0.3 20 0\nT -1 -1 2  1 -1 2  0 1 2\nO\n"
 
+NEEDS_FULL = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no /dev/full")
+
 #: a child that renders with the function `render` of the source put in
 CHILD = """
 import hashlib, sys, time, types
@@ -35,7 +37,7 @@ def block():
 
 def picture(scene, **arguments):
     objects = [ObjectStats("an object with a name as long as a path " * 3, 970, 555, 278, 4321, 17, 0.02)]
-    stats = RunStats(scene.source, 64, 48, "sah", "Imaginary CPU " * 8, "watertight", ["shadows"], objects)
+    stats = RunStats(scene.source, 64, 48, "sah", "Imaginary CPU " * 8, "watertight", effects=["shadows"], objects=objects)
     return Image(np.full((48, 64, 3), 0.5, np.float32), stats)
 
 {source}
@@ -135,14 +137,70 @@ def test_python_m_clrt_is_the_command(tmp_path: Path) -> None:
     assert done.stdout.startswith(b"clrt ")
 
 
-def test_reader_that_stops_reading_causes_no_traceback(tmp_path: Path) -> None:
-    child = start(tmp_path, QUICK)
+@pytest.mark.parametrize("arguments", [[], ["--help"]], ids=["figures", "help"])
+def test_reader_that_stops_reading_is_no_error(tmp_path: Path, arguments: list[str]) -> None:
+    child = start(tmp_path, QUICK, *arguments)
     assert child.stdout is not None
     assert child.stderr is not None
     child.stdout.close()
-    child.wait(20)
-    assert b"Traceback" not in child.stderr.read()
+    assert child.wait(20) == 0
+    assert child.stderr.read() == b""
+    assert ("scene.png" in files(tmp_path)) == (not arguments)
+
+
+def through_shell(folder: Path, source: str, redirection: str, *arguments: str) -> tuple[int, str]:
+    """Exit code and standard error of a child that a shell starts with redirected streams."""
+    (folder / "scene.txt").write_text(SCENE)
+    (folder / "child.py").write_text(CHILD.replace("{source}", source))
+    command = ["sh", "-c", f'exec "$@" {redirection}', "sh", sys.executable, "child.py", *arguments]
+    done = subprocess.run(command, cwd=folder, env=child_environment(), stderr=subprocess.PIPE, text=True, check=False)
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize("redirection", [">&-", pytest.param(">/dev/full", marks=NEEDS_FULL)])
+def test_standard_output_that_cannot_be_written_is_one_line_and_2(tmp_path: Path, redirection: str) -> None:
+    code, error = through_shell(tmp_path, QUICK, redirection, "scene.txt")
+    assert code == 2
+    assert re.fullmatch(r"clrt: error: standard output: .*\n", error)
     assert "scene.png" in files(tmp_path)
+    assert through_shell(tmp_path, QUICK, redirection, "scene.txt", "--quiet") == (0, "")
+
+
+@NEEDS_FULL
+def test_help_on_a_full_disk_is_one_line_and_2(tmp_path: Path) -> None:
+    code, error = through_shell(tmp_path, QUICK, ">/dev/full", "--help")
+    assert (code, error) == (2, "clrt: error: standard output: No space left on device\n")
+
+
+@pytest.mark.parametrize(("argument", "code"), [("scene.txt", 0), ("missing.txt", 2)])
+@pytest.mark.parametrize("redirection", ["2>&-", pytest.param("2>/dev/full", marks=NEEDS_FULL)])
+def test_standard_error_that_cannot_be_written_changes_no_exit_code(tmp_path: Path, redirection: str, argument: str, code: int) -> None:
+    assert through_shell(tmp_path, QUICK, f">out {redirection}", argument)[0] == code
+    picture = tmp_path / "scene.png"
+    assert not picture.exists() or picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_ctrl_c_while_the_program_is_loaded_is_130_without_a_traceback(tmp_path: Path) -> None:
+    # A module that the command imports first stands still, in place of one that takes its time.
+    (tmp_path / "click.py").write_text('import time\nprint("ready", flush=True)\ntime.sleep(20)\n')
+    environment = child_environment()
+    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), environment["PYTHONPATH"]])
+    command = [sys.executable, "-m", "clrt", "--version"]
+    child = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert child.stdout is not None
+    assert child.stdout.readline() == b"ready\n"
+    child.send_signal(signal.SIGINT)
+    _, error = child.communicate(timeout=20)
+    assert (child.returncode, error) == (130, b"clrt: interrupted\n")
+
+
+def test_background_job_keeps_ignoring_ctrl_c(tmp_path: Path) -> None:
+    (tmp_path / "click.py").write_text('import signal\nprint(signal.getsignal(signal.SIGINT) is signal.SIG_IGN)\nraise SystemExit\n')
+    environment = child_environment()
+    environment["PYTHONPATH"] = os.pathsep.join([str(tmp_path), environment["PYTHONPATH"]])
+    command = ["sh", "-c", 'trap "" INT; exec "$@"', "sh", sys.executable, "-m", "clrt"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, check=True)
+    assert done.stdout == b"True\n"
 
 
 def on_terminal(folder: Path, source: str) -> tuple[str, str]:

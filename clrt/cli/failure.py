@@ -10,36 +10,39 @@ With CLRT_DEBUG=1 in the environment every failure shows its traceback.
 
 from __future__ import annotations
 
+import errno
 import os
 import traceback
 
 import click
 
+from clrt.cli import streams
 from clrt.cli.interrupt import EXIT_CODE as INTERRUPTED
 from clrt.errors import ClrtError, SceneError
 
 FAULT = 1
 USER = 2
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EIO}  #: files say their names, so without one it is the stream that click writes its help to
 
 
 def report(error: BaseException) -> int:
     """Print `error` and return the exit code."""
     # click turns KeyboardInterrupt into Abort, and EOFError, too, which would be a fault.
     if isinstance(error, KeyboardInterrupt | click.Abort) and not isinstance(error.__cause__, EOFError):
-        click.echo("clrt: interrupted", err=True)
+        streams.complain("clrt: interrupted\n")
         return INTERRUPTED
     message = _message(error)
     if message is None or os.environ.get("CLRT_DEBUG") == "1":
-        click.echo("".join(traceback.format_exception(error)), err=True, nl=False)
+        streams.complain("".join(traceback.format_exception(error)))
     if message is None:
-        click.echo("clrt: this is a fault of clrt, not of the scene; please report it with the lines above and the scene", err=True)
+        streams.complain("clrt: this is a fault of clrt, not of the scene; please report it with the lines above and the scene\n")
         return FAULT
-    click.echo(message, err=True)
+    streams.complain(f"{message}\n")
     return USER
 
 
 def warn(message: str) -> None:
-    click.echo(f"clrt: warning: {message}", err=True)
+    streams.complain(f"clrt: warning: {message}\n")
 
 
 def _message(error: BaseException) -> str | None:
@@ -53,7 +56,9 @@ def _message(error: BaseException) -> str | None:
         return f"clrt: error: {error.format_message()} (see {command.removesuffix(' render')} --help)"
     if isinstance(error, click.ClickException):
         return f"clrt: error: {error.format_message()}"
-    # An OSError without a file is none of input or output: a fault.
+    if isinstance(error, OSError) and error.filename is None and error.errno in _FULL:
+        return f"clrt: error: {streams.NAME}: {error.strerror}"
+    # Any other OSError without a file is none of input or output: a fault.
     if isinstance(error, OSError) and error.filename is not None:
         return f"clrt: error: {click.format_filename(error.filename)}: {error.strerror}"
     if isinstance(error, MemoryError):

@@ -14,6 +14,7 @@ import threading
 import time
 from typing import NoReturn
 
+from clrt.cli import streams
 from clrt.files import discard_unfinished
 
 EXIT_CODE = 130  #: 128 + SIGINT, what a shell reports for an interrupted program
@@ -32,11 +33,7 @@ def watch() -> None:
 
 def leave() -> NoReturn:
     """End the process now. Not by way of the interpreter's tidying, which waits for kernels that still run."""
-    for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except (OSError, ValueError):  # a closed pipe or file: nothing left to say there
-            continue
+    streams.settle()
     os._exit(EXIT_CODE)
 
 
@@ -45,7 +42,7 @@ def _wait(read_end: int) -> None:
         pass
     time.sleep(_GRACE_S)
     discard_unfinished()
-    if sys.stderr.isatty():
-        os.write(2, _SHOW_CURSOR.encode())
-    os.write(2, b"clrt: interrupted\n")
-    os._exit(EXIT_CODE)
+    try:
+        os.write(2, f"{_SHOW_CURSOR if streams.is_terminal(sys.stderr) else ''}clrt: interrupted\n".encode())
+    finally:
+        os._exit(EXIT_CODE)

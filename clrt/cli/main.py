@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from clrt import __version__
-from clrt.cli import failure
+from clrt.cli import failure, streams
 from clrt.cli.paths import DEFAULT_SCENE
 
 #: a command and the module that has it, in the order of the help; imported when called for, so that `clrt --help` is quick
@@ -81,7 +81,11 @@ class _RenderByDefault(click.Group):
         try:
             result = super().main(args, name, complete_var, standalone_mode=False, **extra)
         except (Exception, KeyboardInterrupt) as error:
-            sys.exit(failure.report(error))
+            result = failure.report(error)
+        except SystemExit as end:  # click's way for EPIPE: from a file that was written to, or else from standard output
+            broken = end.__context__
+            result = failure.report(broken) if isinstance(broken, OSError) and broken.filename else 0
+        streams.settle()
         sys.exit(result if isinstance(result, int) else 0)
 
 
@@ -98,6 +102,7 @@ def main() -> None:
     """The console script: the command under a guard that lets Ctrl-C end it within a second."""
     from clrt.cli import interrupt
 
+    streams.hold_descriptors()
     interrupt.watch()
     try:
         cli.main(prog_name="clrt")

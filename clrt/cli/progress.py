@@ -7,6 +7,8 @@ import time
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from clrt.cli import streams
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.live import Live
@@ -39,7 +41,7 @@ class PhaseProgress:
         self._fraction = min(max(fraction, 0.0), 1.0)
 
     def __enter__(self) -> PhaseProgress:
-        if not self._quiet and sys.stderr.isatty():
+        if not self._quiet and streams.is_terminal(sys.stderr):
             from rich.console import Console
             from rich.live import Live
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import click
+from clrt.cli import streams
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -31,14 +31,14 @@ def print_plainly(renderables: list[RenderableType]) -> None:
     """Print to standard output without trailing blanks; characters that its encoding lacks become question marks."""
     from rich.console import Console
 
-    terminal = sys.stdout.isatty()
+    terminal = streams.is_terminal(sys.stdout)
     buffer = io.StringIO()
     console = Console(file=buffer, force_terminal=terminal, width=None if terminal else _UNBOUNDED, highlight=False)
     for renderable in renderables:
         console.print(renderable)
     encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     text = "".join(line.rstrip() + "\n" for line in buffer.getvalue().splitlines())
-    click.echo(text.encode(encoding, "replace").decode(encoding), nl=False)
+    streams.write(text.encode(encoding, "replace").decode(encoding))
 
 
 def table(headings: list[str], *, words: int = 0) -> Table:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from clrt.cli import paths
+from clrt.cli import paths, streams
 from clrt.cli.progress import PhaseProgress
 from clrt.errors import ClrtError
 
@@ -30,7 +30,7 @@ def convert(mesh: Path, scene: Path, smooth: bool) -> None:
     with PhaseProgress() as progress:
         progress("convert", 0.0)
         summary = convert_mesh(mesh, scene, smooth)
-    click.echo(summary)
+    streams.write(f"{summary}\n")
 
 
 class _Make(click.Command):
@@ -61,4 +61,4 @@ def make(kind: str, out: Path, triangles: int, seed: int) -> None:
     with PhaseProgress() as progress:
         progress("make", 0.0)
         summary = make_scene(kind, out, triangles, seed)
-    click.echo(summary)
+    streams.write(f"{summary}\n")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from clrt.cli import streams
 from clrt.cli.failure import FAULT
 from clrt.cli.progress import PhaseProgress
 from clrt.files import atomic_write, check_writable
@@ -52,13 +53,13 @@ def verify(full: bool, numbers: tuple[int, ...], json_path: str | None, page: st
         _print(results, context)
     broken = failures(results, context)
     for line in broken:
-        click.echo(f"clrt: broken promise: {line}", err=True)
+        streams.complain(f"clrt: broken promise: {line}\n")
     return FAULT if broken else 0
 
 
 def _write_json(text: str, path: str) -> None:
     if path == "-":
-        click.echo(text, nl=False)
+        streams.write(text)
     else:
         with atomic_write(path) as file:
             file.write(text.encode())

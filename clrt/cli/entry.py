@@ -1,0 +1,27 @@
+"""Where the program starts. Until it is loaded, Ctrl-C ends it at once; then interrupt.py takes over."""
+
+from __future__ import annotations
+
+import os
+import signal
+from types import FrameType
+from typing import NoReturn
+
+
+def main() -> None:
+    """The console script and `python -m clrt`."""
+    asked = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else the caller had it ignored, as for background jobs
+    if asked:
+        signal.signal(signal.SIGINT, _leave)
+    from clrt.cli.main import main as run
+
+    if asked:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    run()
+
+
+def _leave(number: int, frame: FrameType | None) -> NoReturn:
+    try:
+        os.write(2, b"clrt: interrupted\n")
+    finally:
+        os._exit(128 + number)
