@@ -135,11 +135,14 @@ class RunStats:
             "objects": [_object_json(o) for o in self.objects],
         }
 
+    def json_text(self) -> str:
+        """`to_json` as text."""
+        return json.dumps(self.to_json(), indent=2, allow_nan=False) + "\n"
+
     def write_json(self, path: str | PathLike[str]) -> None:
-        """Write `to_json` to `path`, whole or not at all. Raises OSError with the path in it."""
-        text = json.dumps(self.to_json(), indent=2, allow_nan=False) + "\n"
+        """Write `json_text` to `path`, whole or not at all. Raises OSError with the path in it."""
         with atomic_write(path) as file:
-            file.write(text.encode())
+            file.write(self.json_text().encode())
 
 
 _TIMES = ("read_s", "build_s", "upload_s", "compile_s", "render_s", "write_s", "total_s", "count_s")

@@ -16,6 +16,7 @@ from click.testing import CliRunner, Result
 import clrt
 from clrt.cli.main import cli
 from clrt.image.image import Image
+from clrt.precision import DEFAULT, RUNGS
 from clrt.stats import ObjectStats, RunStats
 
 SCENE = """\
@@ -161,6 +162,30 @@ def test_stats_are_counted_and_written(run: Run, renderer: FakeRenderer, tmp_pat
     assert "1.25" in result.stdout
 
 
+def test_stats_to_standard_output_are_json_in_place_of_the_figures(run: Run, tmp_path: Path) -> None:
+    for quiet in ([], ["--quiet"]):
+        result = run("scene.txt", "--stats", "-", *quiet)
+        assert (result.exit_code, result.stderr) == (0, "")
+        assert json.loads(result.stdout)["rays"] == 53
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["scene.png", "scene.txt"]
+
+
+def test_file_called_minus_is_one_by_its_path(run: Run, tmp_path: Path) -> None:
+    result = run("scene.txt", "--stats", "./-")
+    assert "Imaginary CPU" in result.stdout
+    assert json.loads((tmp_path / "-").read_text())["rays"] == 53
+
+
+def test_size_goes_as_far_as_that_of_a_scene(run: Run, renderer: FakeRenderer) -> None:
+    assert run("scene.txt", "--size", "65536x1").exit_code == 0
+    assert renderer.calls[0]["size"] == (65536, 1)
+
+
+def test_help_names_all_precisions_and_the_default(run: Run) -> None:
+    text = " ".join(run("--help").stdout.split())
+    assert f"How rays meet triangles: {', '.join(RUNGS)}. [default: {DEFAULT}]" in text
+
+
 def test_report_without_stats_hints_and_shows_no_tests(run: Run) -> None:
     text = run("scene.txt").stdout
     for word in ("object", "all", "Imaginary CPU", "shadows", "scene.png, 8 x 6", "250.0 ms", "--stats FILE"):
@@ -195,6 +220,8 @@ def test_warnings_of_scene_and_picture_go_to_stderr(run: Run, renderer: FakeRend
         ("nowhere/scene.txt", "no folder nowhere"),
         ("quite-another-name.text", "no such file"),
         (".", "folder"),
+        ("", "the name of the file is empty"),
+        ("-", "no standard input or output"),
     ],
 )
 def test_missing_scene_names_the_nearest(run: Run, argument: str, says: str) -> None:
@@ -218,9 +245,15 @@ def test_mesh_instead_of_a_scene_says_how_to_convert(run: Run, tmp_path: Path) -
         (["-o", "scene.txt"], "this is the scene"),
         (["--stats", "./scene.png"], "this is the picture"),
         (["--size", "0x5"], "from 1 to"),
-        (["--size", "100000x5"], "from 1 to"),
+        (["--size", "65537x5"], "from 1 to 65536"),
         (["--size", "5"], "640x480"),
-        (["--depth", "-1"], "--depth"),
+        (["--depth", "-1"], "'-1': this is a whole number of at least 0"),
+        (["--depth", "x"], "'x': this is a whole number of at least 0"),
+        (["--depth", "2.0"], "'2.0': this is a whole number"),
+        (["-o", "-"], "no standard input or output"),
+        (["-o", ""], "the name of the file is empty"),
+        (["--stats", ""], "the name of the file is empty"),
+        (["--dump-kernel", "-"], "no standard input or output"),
         (["--tree", "oak"], "sah"),
         (["--precision", "perfect"], "watertight"),
         (["--sise", "5x5"], "--size"),

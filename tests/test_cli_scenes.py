@@ -62,6 +62,7 @@ def test_convert_smooth_gives_corner_normals(run: Run, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("mesh", "scene", "says"),
     [
+        ("mesh.obj", "-", "no standard input or output"),
         ("mesg.obj", "scene.txt", "mesg.obj: no such file; did you mean mesh.obj?"),
         ("mesh.obj", "no/scene.txt", "no folder"),
         ("mesh.obj", "./mesh.obj", "this is the mesh"),

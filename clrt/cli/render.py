@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import time
 import warnings
 from dataclasses import dataclass
@@ -11,28 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from clrt.cli import failure, paths
+from clrt.cli import arguments as kinds
+from clrt.cli import failure, paths, streams
 from clrt.cli.progress import PhaseProgress
 from clrt.errors import ClrtError
 
 if TYPE_CHECKING:
     from clrt.image.image import Image
     from clrt.scene.model import Scene
-
-_MAX_SIDE = 65535  #: pixels; the renderer's limit on memory comes well before
-
-
-def parse_size(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[int, int] | None:
-    """WIDTHxHEIGHT -> (width, height). Raises click.BadParameter."""
-    if value is None:
-        return None
-    match = re.fullmatch(r"([0-9]{1,9})x([0-9]{1,9})", value.lower())
-    if match is None:
-        raise click.BadParameter(f"{value!r} is no size; write width x height in pixels, such as 640x480")
-    width, height = int(match[1]), int(match[2])
-    if not (1 <= width <= _MAX_SIDE and 1 <= height <= _MAX_SIDE):
-        raise click.BadParameter(f"{value!r}: width and height go from 1 to {_MAX_SIDE}")
-    return width, height
 
 
 @dataclass(frozen=True)
@@ -54,19 +39,23 @@ class Options:
     split_objects: bool
 
 
-_FILE = click.Path(path_type=Path)
-
-
 @click.command("render", short_help="Render a scene; the word is never needed.")
-@click.argument("scene", type=_FILE, required=False)
-@click.option("-o", "--out", type=_FILE, metavar="FILE", help="Picture, .png or .ppm.  [default: SCENE.png in the current folder]")
-@click.option("--size", callback=parse_size, metavar="WxH", help="Width and height in pixels, instead of the scene's.")
+@click.argument("scene", type=kinds.file, required=False)
+@click.option("-o", "--out", type=kinds.file, metavar="FILE", help="Picture, .png or .ppm.  [default: SCENE.png in the current folder]")
+@click.option("--size", type=kinds.size, metavar="WxH", help="Width and height in pixels, instead of the scene's.")
 @click.option("--tree", type=click.Choice(["sah", "median"]), default="sah", show_default=True, help="How the kd-trees are split.")
 @click.option("--device", metavar="NAME", help="Part of the name of an OpenCL device; `clrt devices` lists them.")
-@click.option("--depth", type=click.IntRange(min=0), metavar="N", help="Reflections and refractions in a row, instead of the scene's.")
-@click.option("--precision", metavar="NAME", default="watertight", show_default=True, help="How rays meet triangles: fast, watertight.")
-@click.option("--stats", type=_FILE, metavar="FILE", help="Write the figures as JSON; counts rays and tests in a second pass.")
-@click.option("--dump-kernel", type=_FILE, metavar="FILE", help="Write the OpenCL program that is compiled for this scene.")
+@click.option("--depth", type=kinds.whole(0), metavar="N", help="Reflections and refractions in a row, instead of the scene's.")
+@click.option(
+    "--precision", metavar="NAME", default="watertight", show_default=True, help="How rays meet triangles: fast, watertight, exact, double."
+)
+@click.option(
+    "--stats",
+    type=kinds.file_or_stdout,
+    metavar="FILE",
+    help="Write the figures as JSON, - for standard output; counts rays and tests in a second pass.",
+)
+@click.option("--dump-kernel", type=kinds.file, metavar="FILE", help="Write the OpenCL program that is compiled for this scene.")
 @click.option("--srgb", is_flag=True, help="Encode the picture as sRGB; without it the linear values are written.")
 @click.option("--right-handed", is_flag=True, help="Mirror x: for scenes made in right-handed axes.")
 @click.option("--split-objects", is_flag=True, help="Make each connected component an object, where the scene marks none.")
@@ -87,9 +76,11 @@ def render(**arguments: Any) -> None:
         return
     stats.read_s, stats.write_s = read_s, write_s
     stats.total_s = time.perf_counter() - start - stats.count_s
-    if options.stats is not None:
+    if options.stats is kinds.STDOUT:
+        streams.write(stats.json_text())
+    elif options.stats is not None:
         stats.write_json(options.stats)
-    if not options.quiet:
+    if not options.quiet and options.stats is not kinds.STDOUT:
         from clrt.cli.report import print_report
 
         print_report(stats, picture)
@@ -106,7 +97,8 @@ def _scene_path(options: Options) -> Path:
 def _check(options: Options, scene_path: Path, picture: Path) -> None:
     """Raise now what would else be said after the work."""
     paths.check_scene(scene_path)
-    outputs = {"picture": picture, "file of figures": options.stats, "kernel": options.dump_kernel}
+    figures = None if options.stats is kinds.STDOUT else options.stats
+    outputs = {"picture": picture, "file of figures": figures, "kernel": options.dump_kernel}
     paths.check_outputs({"scene": scene_path}, outputs)
     from clrt.image.image import check_format
     from clrt.precision import rung

@@ -7,16 +7,15 @@ from pathlib import Path
 
 import click
 
+from clrt.cli import arguments as kinds
 from clrt.cli import paths, streams
 from clrt.cli.progress import PhaseProgress
 from clrt.errors import ClrtError
 
-_FILE = click.Path(path_type=Path)
-
 
 @click.command("convert")
-@click.argument("mesh", type=_FILE)
-@click.argument("scene", type=_FILE)
+@click.argument("mesh", type=kinds.file)
+@click.argument("scene", type=kinds.file)
 @click.option("--smooth", is_flag=True, help="Give each corner a normal, the mean of the faces around it.")
 def convert(mesh: Path, scene: Path, smooth: bool) -> None:
     """Make a scene of a mesh (.obj, .ply, .stl, ...).
@@ -45,9 +44,9 @@ class _Make(click.Command):
 
 @click.command("make", cls=_Make)
 @click.argument("kind")
-@click.option("-o", "--out", type=_FILE, required=True, metavar="FILE", help="Scene text to write.")
-@click.option("--triangles", type=click.IntRange(min=1), default=10_000, show_default=True, metavar="N", help="About how many.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, metavar="N", help="Of the random numbers.")
+@click.option("-o", "--out", type=kinds.file, required=True, metavar="FILE", help="Scene text to write.")
+@click.option("--triangles", type=kinds.whole(1), default=10_000, show_default=True, metavar="N", help="About how many.")
+@click.option("--seed", type=kinds.whole(0), default=0, show_default=True, metavar="N", help="Of the random numbers.")
 def make(kind: str, out: Path, triangles: int, seed: int) -> None:
     """Make a scene of any size, for trials and measurements."""
     from clrt.generate import KINDS

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from clrt.cli import arguments as kinds
 from clrt.cli import streams
 from clrt.cli.failure import FAULT
 from clrt.cli.progress import PhaseProgress
@@ -23,14 +25,24 @@ _BEGIN, _END = "<!-- verify:begin -->", "<!-- verify:end -->"
 
 @click.command("verify")
 @click.option("--full", is_flag=True, help="1,000,000 rays a case instead of 100,000: many minutes.")
-@click.option("--case", "numbers", type=click.IntRange(min=1), multiple=True, metavar="N", help="Run this case alone; may be repeated.")
-@click.option("--json", "json_path", metavar="FILE", help="Write all results as JSON too; - for standard output, instead of the table.")
+@click.option("--case", "numbers", type=kinds.whole(1), multiple=True, metavar="N", help="Run this case alone; may be repeated.")
 @click.option(
-    "--markdown", "page", metavar="FILE", help="Write the table as Markdown too; into the place that <!-- verify:begin --> marks, if any."
+    "--json",
+    "json_path",
+    type=kinds.file_or_stdout,
+    metavar="FILE",
+    help="Write all results as JSON too; - for standard output, instead of the table.",
+)
+@click.option(
+    "--markdown",
+    "page",
+    type=kinds.file,
+    metavar="FILE",
+    help="Write the table as Markdown too; into the place that <!-- verify:begin --> marks, if any.",
 )
 @click.option("--device", metavar="NAME", help="Part of the name of a device that `clrt devices` lists.")
 @click.option("--quiet", is_flag=True, help="No table and no progress: broken promises and the exit code only.")
-def verify(full: bool, numbers: tuple[int, ...], json_path: str | None, page: str | None, device: str | None, quiet: bool) -> int:
+def verify(full: bool, numbers: tuple[int, ...], json_path: Path | None, page: Path | None, device: str | None, quiet: bool) -> int:
     """Run the hard cases of docs/numerics.md on this machine.
 
     Counts disagreements with the oracle for each precision, and for a naive variant, which must fail. Exit codes: 0 all promises
@@ -40,7 +52,7 @@ def verify(full: bool, numbers: tuple[int, ...], json_path: str | None, page: st
 
     cases = chosen(numbers)
     for path in (json_path, page):
-        if path not in (None, "-"):
+        if path is not None and path is not kinds.STDOUT:
             check_writable(path)
     context = context_for(device, full=full)
     with PhaseProgress(quiet=quiet) as progress:
@@ -49,7 +61,7 @@ def verify(full: bool, numbers: tuple[int, ...], json_path: str | None, page: st
         _write_json(json.dumps(to_json(results, context), indent=2, ensure_ascii=False) + "\n", json_path)
     if page is not None:
         _write_page(markdown_table(results, context), page)
-    if not quiet and json_path != "-":
+    if not quiet and json_path is not kinds.STDOUT:
         _print(results, context)
     broken = failures(results, context)
     for line in broken:
@@ -57,24 +69,21 @@ def verify(full: bool, numbers: tuple[int, ...], json_path: str | None, page: st
     return FAULT if broken else 0
 
 
-def _write_json(text: str, path: str) -> None:
-    if path == "-":
+def _write_json(text: str, path: Path) -> None:
+    if path is kinds.STDOUT:
         streams.write(text)
     else:
         with atomic_write(path) as file:
             file.write(text.encode())
 
 
-def _write_page(text: str, path: str) -> None:
+def _write_page(text: str, page: Path) -> None:
     """The table into the marked place of a page that has one, or as the whole of the file."""
-    from pathlib import Path
-
-    page = Path(path)
     found = page.read_text(encoding="utf-8") if page.exists() else ""
     if _BEGIN in found and _END in found:
         before, after = found.partition(_BEGIN)[0], found.partition(_END)[2]
         text = f"{before}{_BEGIN}\n{text}\n{_END}{after}"
-    with atomic_write(path) as file:
+    with atomic_write(page) as file:
         file.write(text.encode())
 
 
