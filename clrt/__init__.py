@@ -9,7 +9,7 @@ Importing it costs nothing: NumPy, PyOpenCL and Pillow are imported by the first
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -38,17 +38,21 @@ _LAZY = {
 }
 
 
-def load(path: str | PathLike[str], *, right_handed: bool = False, split_objects: bool = False) -> Scene:
+def load(
+    path: str | PathLike[str], *, right_handed: bool = False, split_objects: bool = False,
+    allow_paths: Sequence[str | PathLike[str]] = (),
+) -> Scene:  # fmt: skip
     """Read and check a scene text.
 
     right_handed : mirror x, for files made in right-handed axes
     split_objects : make each connected component of triangles an object, where the text marks none
+    allow_paths : folders, besides the scene's own, that the files it names may be in
 
     Raises SceneError with one line a fault, OSError where the file cannot be read.
     """
     from clrt.scene.build import load_scene
 
-    return load_scene(path, right_handed=right_handed, split_objects=split_objects)
+    return load_scene(path, right_handed=right_handed, split_objects=split_objects, allow_paths=allow_paths)
 
 
 def render(

@@ -86,6 +86,16 @@ def _smooth_caller(scene: Scene) -> int | None:
     return min((o.line for o in scene.objects if o.vertex_normals is not None), default=None)
 
 
+def _texture_caller(scene: Scene) -> int | None:
+    return min((scene.textures[m.texture].line for m in _used_materials(scene) if m.texture >= 0), default=None)
+
+
+def _globe_caller(scene: Scene) -> int | None:
+    """A picture on a round primitive."""
+    used = np.unique(scene.spheres.material_ids).tolist()
+    return min((scene.textures[t].line for i in used if (t := scene.materials[i].texture) >= 0), default=None)
+
+
 FEATURES: tuple[Feature, ...] = (
     Feature(
         "spheres",
@@ -116,9 +126,22 @@ FEATURES: tuple[Feature, ...] = (
         rays=("refracted", "internal"),
     ),
     Feature("mirror", _material_caller("reflect"), "mirror.cl", material=(("reflect", REAL),), rays=("mirror",)),
+    Feature("globe", _globe_caller, "globe.cl"),
+    Feature(
+        "textures",
+        _texture_caller,
+        "texture.cl",
+        material=(("texture", np.int32),),
+        parameters=(
+            ("textures", "global const Texture *textures"),
+            ("texels", "global const uchar *texels"),
+            ("texel_values", "global const real *texel_values"),
+            ("corner_uvs", "global const double *corner_uvs"),
+        ),
+    ),
     Feature("bounce", _bounce_caller, "bounce.cl", frame=(("depth", np.int32, lambda scene: scene.depth),)),
 )
-HELPERS = frozenset({"bounce"})  #: parts that effects share; not effects of their own
+HELPERS = frozenset({"globe", "bounce"})  #: parts that effects share; not effects of their own
 
 
 @dataclass(frozen=True)

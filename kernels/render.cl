@@ -43,6 +43,7 @@ render_packet(const int column, const int row, global const Frame *frame, global
         for (int a = 0; a < 3; a++) {
             real_n albedo;
             gather(albedo, materials[hit.material[k]].color[a]);
+            //@ albedo
             const real_n seen = choose(hit.found, albedo * sum[a], (real_n)frame->background[a]);
             color[a] += choose(rays.active, weight * seen, (real_n)0);
         }

@@ -26,6 +26,8 @@ WORDS = {
     "fresnel": ("fresnel",),
     "refraction": ("refract", "ior", "media"),
     "mirror": ("mirror", "reflect;"),
+    "textures": ("textur", "texel", "albedo *="),
+    "globe": ("globe", "atan2pi"),
     "bounce": ("bounce",),
 }
 
@@ -45,7 +47,10 @@ def test_source_without_an_effect_holds_none_of_its_names(feature: Feature) -> N
     others = _features(*(f.name for f in FEATURES if f.name != feature.name))
     with_it = program.compose(ALL, rung("watertight"), 16, SHAPE)
     assert _traces(feature, with_it), "the words looked for must occur where the effect is on"
-    dependents = {"direct light": ("shadows",), "bounce": ("mirror", "refraction", "fresnel"), "refraction": ("fresnel",)}.get(feature.name, ())
+    dependents = {
+        "direct light": ("shadows",), "bounce": ("mirror", "refraction", "fresnel"), "refraction": ("fresnel",),
+        "textures": ("globe",), "spheres": ("globe",),
+    }.get(feature.name, ())  # fmt: skip
     left = Features(tuple(pair for pair in others.lines if pair[0] not in dependents))
     assert _traces(feature, program.compose(left, rung("watertight"), 16, SHAPE)) == []
 
@@ -86,6 +91,7 @@ def test_pairs_of_effects_compile_for_any_width(device: Device, names: tuple[str
     wanted = {*names}
     wanted |= {"refraction"} if "fresnel" in wanted else set()
     wanted |= {"bounce"} if {"mirror", "refraction"} & wanted else set()
+    wanted |= {"spheres", "textures"} if "globe" in wanted else set()
     wanted |= {"direct light"} if "shadows" in wanted else set()
     lanes = {0: 16, 1: 8, 2: 4, 3: 1}[sum(map(ord, "".join(names))) % 4]
     program.build(device, program.compose(_features(*wanted), rung("watertight"), lanes, SHAPE))

@@ -17,7 +17,7 @@ from clrt.scene.model import Scene
 SCENES = Path(__file__).parents[1] / "scenes"
 ALL = sorted(SCENES.rglob("*.txt"))
 EXPECTED = re.compile(r"^# pixel \((\d+),(\d+)\) is (\S+) (\S+) (\S+)$", re.MULTILINE)
-EFFECTS = ("corners", "fresnel", "glass", "mirror", "phong", "shadow", "smooth", "sphere")
+EFFECTS = ("corners", "fresnel", "glass", "mirror", "phong", "shadow", "smooth", "sphere", "texture")
 
 #: the comments have six decimals
 ROUNDING = 0.5e-6
@@ -82,7 +82,7 @@ def test_comment_holds_on_the_device(name: str) -> None:
 
 def test_scenes_show_their_effect_and_not_another() -> None:
     rays = {name: picture(name)[1].rays for name in EFFECTS}
-    for name in ("corners", "phong", "shadow", "smooth", "sphere"):
+    for name in ("corners", "phong", "shadow", "smooth", "sphere", "texture"):
         assert rays[name].get("reflected", 0) == rays[name].get("refracted", 0) == 0, name
     assert rays["mirror"]["reflected"] > 0
     assert rays["mirror"].get("refracted", 0) == 0

@@ -37,6 +37,7 @@ class Options:
     srgb: bool
     right_handed: bool
     split_objects: bool
+    allow_path: tuple[Path, ...]
 
 
 @click.command("render", short_help="Render a scene; the word is never needed.")
@@ -59,6 +60,7 @@ class Options:
 @click.option("--srgb", is_flag=True, help="Encode the picture as sRGB; without it the linear values are written.")
 @click.option("--right-handed", is_flag=True, help="Mirror x: for scenes made in right-handed axes.")
 @click.option("--split-objects", is_flag=True, help="Make each connected component an object, where the scene marks none.")
+@click.option("--allow-path", type=_FILE, multiple=True, metavar="DIR", help="Permit the scene to name files in DIR, too.")
 @click.option("-q", "--quiet", is_flag=True, help="Print no figures and no progress.")
 def render(**arguments: Any) -> None:
     """Render SCENE to a picture. The same as `clrt SCENE`."""
@@ -113,7 +115,9 @@ def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene,
 
     progress("read", 0.0)
     start = time.perf_counter()
-    scene = load_scene(path, right_handed=options.right_handed, split_objects=options.split_objects)
+    scene = load_scene(
+        path, right_handed=options.right_handed, split_objects=options.split_objects, allow_paths=options.allow_path
+    )
     for warning in scene.warnings:
         failure.warn(f"{scene.source}: {warning}")
     return scene, time.perf_counter() - start

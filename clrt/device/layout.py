@@ -78,6 +78,12 @@ def sphere(real: type) -> np.dtype[np.void]:
     return struct_dtype([("given", np.float64, (4,)), ("center", real, (3,)), ("radius", real), ("material", np.int32)])
 
 
+def texture(real: type) -> np.dtype[np.void]:
+    """A picture and how it is looked up: where its texels begin, in bytes, and the values of its codes; wrap as texture.cl has it."""
+    return struct_dtype([("first", np.int64), ("values", np.int32), ("code_bytes", np.int32), ("width", np.int32), ("height", np.int32),
+                         ("wrap", np.int32), ("linear", np.int32)])  # fmt: skip
+
+
 _F8_VECTOR: Any = (np.float64, (3,))
 
 #: a ray of a caller's array, in float64; `scale` is the kernel's own

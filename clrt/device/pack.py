@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device import layout
+from clrt.device import layout, texels
 from clrt.device.program import MEDIA_DEPTH, frame_dtype, material_dtype
 from clrt.features import Features
 from clrt.kdtree.arrays import LEAF
@@ -231,6 +231,15 @@ def _media(packed: Packed) -> NDArray[np.int32]:
     return np.concatenate([[meshes, len(around)], pairs.ravel(), rank]).astype(np.int32)
 
 
+def _corner_uvs(packed: Packed) -> FloatArray:
+    """(s, 3, 2) float64, the texture coordinates of the corners; zero where a triangle has none."""
+    given = [np.zeros((len(o), 3, 2)) if o.uvs is None else o.uvs for o in packed.scene.objects]
+    return np.concatenate([np.zeros((0, 3, 2)), *(uvs[order] for uvs, order in zip(given, packed.orders, strict=True))])
+
+
 _PACKERS: dict[str, Callable[[Packed], NDArray[Any]]] = {
     "lights": _lights, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media,
+    "textures": lambda packed: texels.records(packed.scene.textures, packed.real), "corner_uvs": _corner_uvs,
+    "texels": lambda packed: texels.codes(packed.scene.textures),
+    "texel_values": lambda packed: texels.values(packed.scene.textures, packed.real),
 }  # fmt: skip

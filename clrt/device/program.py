@@ -88,7 +88,8 @@ def _structs(features: Features, precision: Precision, entry: str) -> str:
         ("Surface", layout.surface(real)), ("Material", material_dtype(features, precision)), ("Frame", frame_dtype(features, precision)),
     ]  # fmt: skip
     declared = " ".join(declaration for f in features.active for _, declaration in f.parameters)
-    names += [(name, make(real)) for name, make in (("Light", layout.light), ("Sphere", layout.sphere)) if f" {name} " in declared]
+    optional = (("Light", layout.light), ("Sphere", layout.sphere), ("Texture", layout.texture))
+    names += [(name, make(real)) for name, make in optional if f" {name} " in declared]
     if entry == "cast":
         names += [("GivenRay", layout.GIVEN_RAY), ("HitSource", layout.HIT_SOURCE), ("HitRecord", layout.HIT_RECORD)]
     return "".join(layout.c_struct(name, dtype) for name, dtype in names)

@@ -51,6 +51,7 @@ class Primitives:
     material : (n + k,); object_id : (n + k,) what the stack of dielectrics holds: mesh objects first, then spheres
     curvature : (n + k,) 1 / length: how fast the shading normal turns along the surface (0: flat)
     curved : (n + k,) bool, a triangle whose corners' normals are not all the face's own
+    uvs : (n, 3, 2) texture coordinates of the corners, 0 where there are none; textured : (n + k,) bool
     largest : no coordinate of a triangle or of the eye is greater
     """
 
@@ -63,6 +64,8 @@ class Primitives:
     object_id: IndexArray
     curvature: FloatArray
     curved: BoolArray
+    uvs: FloatArray
+    textured: BoolArray
     largest: float
     edges: EdgeTable
 
@@ -86,18 +89,20 @@ class Primitives:
         material = np.concatenate([*(o.material_ids for o in objects), spheres.material_ids]).astype(np.int64)
         object_id = np.concatenate([*(np.full(len(o), ids[id(o)]) for o in objects), len(objects) + np.arange(len(spheres))])
         largest = float(np.abs(np.concatenate([vertices.reshape(-1, 3), scene.camera.eye[None]])).max())
+        uvs = np.concatenate([np.zeros((0, 3, 2)), *(np.zeros((len(o), 3, 2)) if o.uvs is None else o.uvs for o in objects)])
+        textured = np.array([m.texture >= 0 for m in scene.materials], np.bool_)[material]
         curvature = np.concatenate([_curvature(vertices, corner), 1.0 / spheres.radii])
         return cls(vertices, _face_normals(vertices), corner, spheres.centers, spheres.radii, material, object_id.astype(np.int64),
-                   curvature, curved, largest, EdgeTable.build(vertices, largest))  # fmt: skip
+                   curvature, curved, uvs, textured, largest, EdgeTable.build(vertices, largest))  # fmt: skip
 
     @property
     def triangle_count(self) -> int:
         return len(self.vertices)
 
     def same_look(self, p: IndexArray, q: IndexArray) -> BoolArray:
-        """(k,) bool: flat triangles of one material and one normal (either sign), so that it makes no difference which is seen."""
+        """(k,) bool: flat triangles of one plain material and one normal (either sign), so that it makes no difference which is seen."""
         flat = (np.maximum(p, q) < self.triangle_count) & (self.curvature[p] == 0.0) & (self.curvature[q] == 0.0)
-        same: BoolArray = flat & (self.material[p] == self.material[q])
+        same: BoolArray = flat & (self.material[p] == self.material[q]) & ~self.textured[p]
         rows = np.flatnonzero(same)
         n_p, n_q = self.corner_normals[p[rows], 0], self.corner_normals[q[rows], 0]
         same[rows] = np.abs(np.einsum("ki,ki->k", n_p, n_q)) > 1.0 - 1e-12

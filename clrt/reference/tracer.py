@@ -17,6 +17,7 @@ from clrt.reference.crossings import BAND, Rays
 from clrt.reference.geometry import MaterialTable, Primitives
 from clrt.reference.lines import TILE_BYTES
 from clrt.reference.shade import Surface, local_color, surfaces
+from clrt.reference.texture import tints
 from clrt.reference.visibility import closest
 from clrt.scene.model import Scene
 
@@ -140,6 +141,8 @@ def _trace(world: _World, wave: _Wave, picture: ReferencePicture, depth: int) ->
         world.prims, world.materials, world.scene.lights, surface, wave.weight, world.tile_bytes
     )
     picture.rays["shadow"] += shadow_rays
+    tint, sharpness = tints(world.scene, world.prims, surface)
+    color, margin = color * tint, np.minimum(margin, sharpness)
     np.add.at(picture.pixels, wave.pixel, wave.weight[:, None] * color)
     np.minimum.at(picture.margin, wave.pixel, margin)
     return _next(world, wave, surface, t, picture) if depth < world.scene.depth else _select(wave, np.zeros(0, np.int64))

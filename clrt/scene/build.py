@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -13,26 +14,38 @@ from clrt.scene.faults import Faults
 from clrt.scene.grammar import LETTERS
 from clrt.scene.model import Material, MeshObject, PointLight, Scene, Spheres
 from clrt.scene.objects import build_objects, material_of
+from clrt.scene.picture import Folders
 from clrt.scene.text import Declarations, read_declarations, read_file
+from clrt.scene.textures import read_textures
 from clrt.scene.triangles import flip_x
 from clrt.scene.words import WORDS, Draft
 
 _ANYTHING = re.compile(r"[^\s\ufeff]")
 
 
-def load_scene(path: str | PathLike[str], *, right_handed: bool = False, split_objects: bool = False) -> Scene:
+def load_scene(
+    path: str | PathLike[str], *, right_handed: bool = False, split_objects: bool = False,
+    allow_paths: Sequence[str | PathLike[str]] = (),
+) -> Scene:  # fmt: skip
     """Read and check the scene text of a file.
 
     right_handed : mirror x, for files made in right-handed axes
     split_objects : make each connected component of triangles an object, where no O line closes one
+    allow_paths : folders, besides the scene's own, that the files it names may be in
 
     Raises SceneError with one `file:line:column: error: ...` line a fault, also where the file cannot be read.
     """
-    return parse_scene(read_file(Path(path)), str(path), right_handed=right_handed, split_objects=split_objects)
+    folders = Folders(Path(path).parent, [Path(p) for p in allow_paths])
+    return parse_scene(read_file(Path(path)), str(path), right_handed=right_handed, split_objects=split_objects, folders=folders)
 
 
-def parse_scene(text: str, source: str = "<text>", *, right_handed: bool = False, split_objects: bool = False) -> Scene:
-    """Check a scene text that is in memory; `source` stands for the file's name in messages. Otherwise as `load_scene`."""
+def parse_scene(
+    text: str, source: str = "<text>", *, right_handed: bool = False, split_objects: bool = False, folders: Folders | None = None
+) -> Scene:
+    """Check a scene text that is in memory; `source` stands for the file's name in messages. Otherwise as `load_scene`.
+
+    folders : where files that the scene names may be; without it, the current folder
+    """
     faults = Faults(source)
     if not _ANYTHING.search(text):
         faults.add(1, 1, "the text is empty; a scene has at least the lines E, V, F, R, M and a T or an S")
@@ -41,20 +54,21 @@ def parse_scene(text: str, source: str = "<text>", *, right_handed: bool = False
     _check_primitives(found, faults)
     _check_materials(found, faults)
     _check_words(found, faults)
+    textured = read_textures(found, folders or Folders(Path()), faults)
     camera = build_camera(found, right_handed, faults)
     faults.raise_if_any()
     assert camera is not None  # a camera that cannot be built is a fault
 
     warnings: list[str] = []
-    objects = build_objects(found, split_objects, warnings)
-    draft = Draft(_materials(found), _lights(found))
+    objects = build_objects(found, split_objects, warnings, textured.uvs)
+    draft = Draft(textured.materials(_materials(found)), _lights(found))
     for call in found.words:
         WORDS[call.name].apply(draft, call)
     if not draft.lights:
         warnings.append("there is no light (L); only the ambient part of the materials is seen")
     scene = Scene(
         camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,
-        source, tuple(warnings),
+        source, tuple(warnings), textures=textured.textures,
     )  # fmt: skip
     return _mirrored(scene) if right_handed else scene
 

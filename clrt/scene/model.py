@@ -77,6 +77,7 @@ class Material:
 
     fresnel : Fresnel's equations split `refract` between the reflected and the refracted ray; `reflect` is 0 then
     fresnel_line : the line that says so (0: none)
+    texture : index into Scene.textures of the picture that multiplies the colour, -1 for none
     """
 
     color: tuple[float, float, float]
@@ -90,6 +91,32 @@ class Material:
     line: int = 0
     fresnel: bool = False
     fresnel_line: int = 0
+    texture: int = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A picture as its file has it: texels (h, w, 4) uint8 or uint16, red, green, blue, alpha; row 0 at the top."""
+
+    texels: NDArray[np.uint8] | NDArray[np.uint16]
+    name: str = "picture"
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """A picture and how it is looked up: u to the right, v up, 0 to 1 across the picture.
+
+    wrap : beyond that, "repeat", "clamp" (the edge goes on) or "mirror" (every second copy is turned round)
+    linear : bilinear between the middles of texels, else the texel that holds the point
+    srgb : the colours are sRGB-encoded, else linear
+    line : where the scene text calls for it (0: not from a text)
+    """
+
+    picture: Picture
+    wrap: str = "repeat"
+    linear: bool = True
+    srgb: bool = True
+    line: int = 0
 
 
 @dataclass(frozen=True)
@@ -113,6 +140,7 @@ class MeshObject:
     first_prim : primitive id of the object's triangle 0; ids run through the scene in the order of its text
     name : for people, such as "object 2"
     line : the line that calls for smooth normals (0: none)
+    uvs : (n, 3, 2) float64 texture coordinates a corner, or None where no triangle of the scene has any
     """
 
     vertices: FloatArray
@@ -122,6 +150,7 @@ class MeshObject:
     vertex_normals: FloatArray | None = None
     name: str = "object"
     line: int = 0
+    uvs: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.vertices)
@@ -160,6 +189,7 @@ class Scene:
     depth: int = 5
     source: str = "<scene>"
     warnings: tuple[str, ...] = ()
+    textures: tuple[Texture, ...] = ()
 
     @property
     def triangle_count(self) -> int:

@@ -93,9 +93,12 @@ def checked_vertex_normals(soup: Soup, normals: FloatArray, warnings: list[str])
     return np.where(zero[:, :, None], facing[:, None, :], given)
 
 
-def build_objects(found: Declarations, split: bool, warnings: list[str]) -> tuple[MeshObject, ...]:
+def build_objects(
+    found: Declarations, split: bool, warnings: list[str], uvs: FloatArray | None = None
+) -> tuple[MeshObject, ...]:
     """All triangles as objects; primitive ids run through them in the order of the text.
 
+    uvs : (n, 3, 2) float64, texture coordinates of all triangles in the order of their lines
     split : make each connected component an object where no O line closes one. Ids then run through the
         components, in the order of their first triangles.
     """
@@ -116,7 +119,7 @@ def build_objects(found: Declarations, split: bool, warnings: list[str]) -> tupl
     order = np.argsort(group, kind="stable")
     starts = np.flatnonzero(np.diff(group[order], prepend=-1)).tolist()
     return tuple(
-        _object(soup, normals, vertex_normals, material_ids, order[start:stop], start, number)
+        _object(soup, normals, vertex_normals, material_ids, order[start:stop], start, number, uvs)
         for number, (start, stop) in enumerate(zip(starts, [*starts[1:], len(soup)], strict=False), 1)
     )
 
@@ -128,7 +131,7 @@ def material_of(found: Declarations, lines: NDArray[np.int64]) -> IntArray:
 
 def _object(
     soup: Soup, normals: FloatArray, vertex_normals: FloatArray | None, material_ids: IntArray,
-    rows: NDArray[np.int64], first_prim: int, number: int,
+    rows: NDArray[np.int64], first_prim: int, number: int, uvs: FloatArray | None,
 ) -> MeshObject:  # fmt: skip
     """One object of the triangles `rows`, copied out of the soup."""
     smooth_lines = soup.lines[rows][soup.smooth[rows]]
@@ -140,4 +143,5 @@ def _object(
         vertex_normals=vertex_normals[rows] if vertex_normals is not None and len(smooth_lines) else None,
         name=f"object {number}",
         line=int(smooth_lines[0]) if len(smooth_lines) else 0,
+        uvs=uvs[rows] if uvs is not None else None,
     )

@@ -28,14 +28,26 @@ class Text:
     name: str
 
 
+@dataclass(frozen=True)
+class Choice:
+    """A field that takes one of a few texts."""
+
+    name: str
+    options: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class WordCall:
-    """One line with a word, checked against its grammar: field name -> value, left-out keys with their defaults."""
+    """One line with a word, checked against its grammar: field name -> value, left-out keys with their defaults.
+
+    columns : field name -> column of its value, of the fields that are written
+    """
 
     name: str
     line: int
     column: int
     values: Mapping[str, Value]
+    columns: Mapping[str, int] = field(default_factory=dict)
 
     def number(self, name: str) -> float:
         """The value of a numeric field."""
@@ -68,14 +80,24 @@ class Word:
     of_glass : belongs to the material above it, which has to have Refract > 0; `once` then means once a material
     """
 
-    positional: tuple[Field | Text, ...]
+    positional: tuple[Field | Text | Choice, ...]
     example: str
     apply: Callable[[Draft, WordCall], None]
-    keys: tuple[tuple[Field | Text, Value], ...] = ()
+    keys: tuple[tuple[Field | Text | Choice, Value], ...] = ()
     once: bool = True
     of_glass: bool = False
 
 _BACKGROUND = color_fields()
+_TEXTURE_KEYS: tuple[tuple[Field | Text | Choice, Value], ...] = (
+    (Choice("wrap", ("repeat", "clamp", "mirror")), "repeat"),
+    (Choice("filter", ("linear", "nearest")), "linear"),
+    (Choice("srgb", ("yes", "no")), "yes"),
+)
+_UV = tuple(Field(f"{axis} of corner {corner}") for corner in (1, 2, 3) for axis in "uv")
+_PROJECT_KEYS: tuple[tuple[Field | Text | Choice, Value], ...] = (
+    (Choice("axis", ("x", "y", "z")), "y"),
+    (Field("scale", low=0.0, low_open=True), 1.0),
+)
 _DEPTH = Field("depth", low=0.0, high=float(GREATEST_DEPTH), whole=True)
 
 
@@ -98,9 +120,16 @@ def _set_fresnel(draft: Draft, call: WordCall) -> None:
     draft.materials[i] = replace(draft.materials[i], reflect=0.0, refract=total, fresnel=True, fresnel_line=call.line)
 
 
+def _no_change(draft: Draft, call: WordCall) -> None:
+    """For words whose lines scene/textures.py reads: they hold for the material or the triangle above them."""
+
+
 WORDS: dict[str, Word] = {
     "background": Word(_BACKGROUND, "background 0.2 0.3 0.5", _set_background),
     "depth": Word((_DEPTH,), "depth 5", _set_depth),
+    "texture": Word((Text("picture"),), "texture wood.png wrap=mirror", _no_change, _TEXTURE_KEYS, once=False),
+    "uv": Word(_UV, "uv 0 0 1 0 1 1", _no_change, once=False),
+    "project": Word((), "project axis=y scale=2", _no_change, _PROJECT_KEYS, once=False),
     "fresnel": Word((), "fresnel", _set_fresnel, of_glass=True),
 }
 
@@ -124,7 +153,8 @@ def read_word(tokens: Sequence[Token], line: int, faults: Faults) -> WordCall | 
         values[declared.name] = _read_value(declared, token, line, faults)
     values |= _read_keys(name, word, tokens[1:], line, faults)
     read = {key: value for key, value in values.items() if value is not None}
-    return WordCall(name, line, tokens[0].column, read) if len(read) == len(values) else None
+    columns = {declared.name: token.column for declared, token in zip(word.positional, plain, strict=True)}
+    return WordCall(name, line, tokens[0].column, read, columns) if len(read) == len(values) else None
 
 
 def _read_keys(name: str, word: Word, tokens: Sequence[Token], line: int, faults: Faults) -> dict[str, Value | None]:
@@ -148,9 +178,11 @@ def _read_keys(name: str, word: Word, tokens: Sequence[Token], line: int, faults
     return values
 
 
-def _read_value(declared: Field | Text, token: Token, line: int, faults: Faults) -> Value | None:
+def _read_value(declared: Field | Text | Choice, token: Token, line: int, faults: Faults) -> Value | None:
     if isinstance(declared, Field):
         return read_in_range(token, declared, line, faults)
+    if isinstance(declared, Choice):
+        return _read_choice(declared, token, line, faults)
     if token.left_open:
         faults.add(line, token.column, f'expected a second double quote after {shown(token.text)} ({declared.name})')
         return None
@@ -158,3 +190,12 @@ def _read_value(declared: Field | Text, token: Token, line: int, faults: Faults)
         faults.add(line, token.column, f"expected a text ({declared.name}), found nothing")
         return None
     return token.unquoted
+
+
+def _read_choice(declared: Choice, token: Token, line: int, faults: Faults) -> str | None:
+    if token.text in declared.options:
+        return token.text
+    listed = ", ".join(declared.options[:-1]) + f" or {declared.options[-1]}"
+    hint = did_you_mean(token.text, declared.options)
+    faults.add(line, token.column, f"{declared.name} must be {listed}, found {shown(token.text)}{hint}")
+    return None
