@@ -60,7 +60,7 @@ class Options:
 @click.option("--srgb", is_flag=True, help="Encode the picture as sRGB; without it the linear values are written.")
 @click.option("--right-handed", is_flag=True, help="Mirror x: for scenes made in right-handed axes.")
 @click.option("--split-objects", is_flag=True, help="Make each connected component an object, where the scene marks none.")
-@click.option("--allow-path", type=_FILE, multiple=True, metavar="DIR", help="Permit the scene to name files in DIR, too.")
+@click.option("--allow-path", type=kinds.file, multiple=True, metavar="DIR", help="Permit the scene to name files in DIR, too.")
 @click.option("-q", "--quiet", is_flag=True, help="Print no figures and no progress.")
 def render(**arguments: Any) -> None:
     """Render SCENE to a picture. The same as `clrt SCENE`."""
