@@ -26,7 +26,7 @@ Caller = Callable[[Scene], "int | None"]
 class Feature:
     """One effect.
 
-    name : as `clrt explain` and the statistics tell it
+    name : as the figures of a run tell it
     called_by : scene -> number of the first line that calls for it (0: no text), None where none does
     kernel : its file in kernels/
     early : its file stands before the scene's traversal, which calls it

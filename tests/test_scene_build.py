@@ -182,6 +182,12 @@ def test_empty_objects_are_counted() -> None:
     assert (len(scene.objects), scene.warnings) == (1, ("3 O lines close no triangles and are left out (the first: line 7)",))
 
 
+def test_o_below_spheres_alone_is_no_cause_for_a_warning() -> None:
+    assert build("S 0 0 1 1", "O").warnings == ()
+    assert build(FLAT, "O", "S 0 0 1 1", "O").warnings == ()
+    assert build("S 0 0 1 1", "O", FLAT, "O", "O").warnings == ("line 11: O closes no triangles and is left out",)
+
+
 @pytest.mark.parametrize("lines", [["S 0 0 1 1"], ["S 0 0 1 1", "O"]])
 def test_spheres_alone_make_a_scene_without_objects(lines: list[str]) -> None:
     scene = build(*lines)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from clrt.stats import ObjectStats, RunStats
+from clrt.stats import RAY_KINDS, ObjectStats, RunStats
 
 #: the interface: keys may be added, never taken away
 KEYS = {
@@ -69,3 +69,11 @@ def test_write_json_not_a_number_writes_nothing(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="JSON"):
         run.write_json(tmp_path / "stats.json")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_every_key_stands_in_the_table_of_the_readme() -> None:
+    readme = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    table = readme.partition("## Figures of a run")[2].partition("## Figures\n")[0]
+    run = json.loads(counted_run().json_text())
+    keys = {*run, *run["objects"][0], *RAY_KINDS}
+    assert sorted(key for key in keys if f"`{key}`" not in table) == []
