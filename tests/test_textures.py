@@ -193,6 +193,7 @@ def bad(tmp_path: Path) -> Path:
     noise.save(tmp_path / "moving.png", save_all=True, append_images=[noise.rotate(90), noise.rotate(180)])
     noise.save(tmp_path / "moving.gif", save_all=True, append_images=[noise.rotate(90)])
     Image.new("F", (2, 2)).save(tmp_path / "float.tiff")
+    noise.save(tmp_path / "page.eps")
     _deep_color_png(tmp_path / "deep.png")
     (tmp_path / "folder").mkdir()
     return tmp_path
@@ -209,6 +210,7 @@ def bad(tmp_path: Path) -> Path:
         ("texture   moving.gif", "7:11: error: moving.gif is animated: it has 2 frames"),
         ("texture float.tiff", "7:9: error: float.tiff has pixels of the kind F"),
         ("texture deep.png", "7:9: error: deep.png has colours of 16 bits a channel; save it with 8, or in greyscale with 16"),
+        ("texture page.eps", "7:9: error: page.eps is no picture that can be read, or has no pixels; save it as PNG or JPEG"),
         ("texture folder", "7:9: error: folder is a folder"),
         ("texture ../whole.png", "7:9: error: ../whole.png leads out of the scene's folder; permit its folder with --allow-path"),
         ("texture /etc/passwd", "7:9: error: /etc/passwd leads out of the scene's folder"),

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from clrt.scene.model import Picture
 
+#: formats that are read; others of Pillow start programs (EPS) or are no pictures of texels
+FORMATS = ("PNG", "JPEG", "BMP", "PPM", "TGA", "TIFF", "GIF", "WEBP")
 MOST_TEXELS = 1 << 26  #: of one picture: 256 MiB at 8 bits a channel
 _BYTE_MODES = ("1", "L", "LA", "P", "PA", "RGB", "RGBA", "CMYK")  #: of Pillow, at most 8 bits a channel
 _GREY_16 = ("I;16", "I;16L", "I;16B", "I;16N")
@@ -58,7 +60,7 @@ def read_picture(path: Path, name: str) -> Picture:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            with Image.open(path) as image:
+            with Image.open(path, formats=FORMATS) as image:
                 _check(image, name)
                 image.load()
                 texels = _texels(image)
