@@ -7,8 +7,8 @@
 // | expansion_add_scaled   | h += e * b                  | Shewchuk 1997: scale, expansion-sum, compress   | the same                   |
 // | expansion_triple       | d . (p x q)                 | from the above                                  | the same                   |
 //
-// A compressed expansion's components are each below an ulp of the next (Shewchuk, theorem 23), and all are doubles, of which the
-// exponents span 2098 bits: so it has at most 40, and 40 plus the 80 of a scaled one fit COMPONENTS. Inputs whose nonzero
+// The first pass of Compress leaves components that are each at most half an ulp of the one before, the second no more of them; all
+// are doubles, of which the exponents span 2098 bits: so there are at most 41, and 41 plus the 82 of a scaled one fit COMPONENTS. Inputs whose nonzero
 // coordinate differences lie in [1e-40, 1e40] neither overflow nor underflow in the products of six of them taken here.
 #define COMPONENTS 128
 typedef struct {

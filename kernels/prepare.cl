@@ -4,6 +4,11 @@
 // All in float64, rounded once to `real`; the bounds are derived in triangle.cl.
 static inline double length_double(const double *a) { return sqrt(dot_double(a, a)); }
 
+// 8u |n|, and the float64 error of n = e1 x e2 itself, which is below 4 * 2^-53 |e1||e2| and counts for needles.
+static inline double normal_bound(const double *e1, const double *e2, const double *normal) {
+    return 8 * UNIT_ROUNDOFF * length_double(normal) + 16 * 0x1p-53 * length_double(e1) * length_double(e2);
+}
+
 kernel void prepare_triangles(global const double *vertices, double4 local_origin, global Triangle *triangles, int count) {
     const int slot = get_global_id(0);
     if (slot >= count) return;
@@ -22,7 +27,7 @@ kernel void prepare_triangles(global const double *vertices, double4 local_origi
         triangles[slot].normal[a] = (real)normal[a];
     }
     triangles[slot].bound = (real)(64 * UNIT_ROUNDOFF * fmax(length_double(e1), length_double(e2)));
-    triangles[slot].normal_bound = (real)(8 * UNIT_ROUNDOFF * length_double(normal));
+    triangles[slot].normal_bound = (real)normal_bound(e1, e2, normal);
 }
 
 kernel void prepare_planes(global const double *vertices, double4 shared_origin, global EdgePlanes *planes, int first, int count) {
@@ -50,5 +55,6 @@ kernel void prepare_planes(global const double *vertices, double4 shared_origin,
     for (int a = 0; a < 3; a++) planes->normal[a] = (real)normal[a];
     planes->offset = (real)dot_double(corner[0], normal);
     planes->bound = (real)(8 * UNIT_ROUNDOFF * steepest + 16 * 0x1p-53 * longest);
-    planes->normal_bound = (real)(8 * UNIT_ROUNDOFF * length_double(normal));
+    planes->normal_bound = (real)normal_bound(e1, e2, normal);
+    planes->offset_bound = (real)(16 * 0x1p-53 * length_double(corner[0]) * length_double(e1) * length_double(e2));
 }

@@ -42,34 +42,36 @@ HOT EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, rea
 }
 
 // The distance to the triangle's plane, t = offset / rate with offset = n.(v0 - o), rate = n.d.
-//   rate is off by (1 + 3)u |n||d|, offset by u of itself (shared origin, from float64) or by 8u reach |n| (rounded origin and corner,
-//   difference, dot product), the quotient by 2u. Rates below 2 (8u |n|) are grazing; above, the true rate is more than half of
+//   rate is off by (1 + 3)u |n||d| and d times the float64 error of n, offset by u of itself and the float64 error of n.(v0 - o),
+//   `offset_bound` (shared origin), or by 8u reach |n| (rounded origin and corner, difference, dot product) and reach times the
+//   error of n, the quotient by 2u. Rates below 2 (8u |n|) are grazing; above, the true rate is more than half of
 //   the computed one, and with |rate| <= |n||d|, t is off by less than (2 |t|) (8u |n|) / |rate|, or
-//   2 (|t| + reach) (8u |n|) / |rate|; normal_bound is 8u |n|.
+//   2 (|t| + reach) (8u |n|) / |rate|; normal_bound is 8u |n| and 4 times the error of n.
 typedef struct {
     real_n t, error;
     mask_n grazing;  // lanes that run so nearly inside the plane that t means nothing
 } PlaneHit;
 
 HOT PlaneHit plane_hit(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin) {
-    real_n offset, rate, normal_bound, inherited = (real_n)0;
+    real_n offset, rate, normal_bound, offset_error;
     if (shared_origin) {
         global const EdgePlanes *plane = geometry->planes + slot;
         offset = (real_n)plane->offset;
         rate = dot_uniform(rays->direction, plane->normal);
         normal_bound = (real_n)plane->normal_bound;
+        offset_error = (real_n)plane->offset_bound;
     } else {
         global const Triangle *triangle = geometry->triangles + slot;
         const real_n to_corner[3] = {triangle->v0[0] - rays->origin[0], triangle->v0[1] - rays->origin[1], triangle->v0[2] - rays->origin[2]};
         offset = dot_uniform(to_corner, triangle->normal);
         rate = dot_uniform(rays->direction, triangle->normal);
         normal_bound = (real_n)triangle->normal_bound;
-        inherited = reach;
+        offset_error = reach * normal_bound;
     }
     PlaneHit hit;
     const real_n inverse = R(1.0) / rate;
     hit.t = offset * inverse;
-    hit.error = (abs_n(hit.t) + inherited) * abs_n(R(2.0) * normal_bound * inverse);
+    hit.error = multiply_add(abs_n(hit.t), normal_bound, offset_error) * abs_n(R(2.0) * inverse);
     hit.grazing = is_at_most(abs_n(rate), R(2.0) * normal_bound);
     return hit;
 }

@@ -61,7 +61,7 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
     // The triangle that the ray already has, met again in another leaf, is nothing new.
     possible &= (plane.grazing | ~outside) & ~is_equal(rays->skip, (mask_n)slot) & ~is_equal(hits->slot, (mask_n)slot);
     mask_n hit = possible & ~plane.grazing & (is_greater(f.lowest, f.bound) | is_less(f.highest, -f.bound));
-    hit &= is_greater(t - error, rays->t_min) & is_less(t + error, hits->low);
+    hit &= is_greater(t - error, rays->t_min_high) & is_less(t + error, hits->low);
     //@ accept_sure
     const mask_n unsure = possible & ~hit;
     if (any_lane(unsure)) {
@@ -93,14 +93,16 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
     geometry.decided = decided;
 //@end
 //@hook rays_members
+    real_n t_min_high;                   // t_min, less what rounding it may have lowered it by
     mask_n limit;                        // the slot of a triangle whose plane ends the ray, instead of t_max; or -1
 //@end
 //@hook rays_begin
     rays->limit = (mask_n)-1;
+    rays->t_min_high = multiply_add(abs_n(rays->t_min), (real_n)(R(8.0) * UNIT_ROUNDOFF), rays->t_min);
 //@end
 //@hook hits_members
     real_n low;                          // t is at least this
 //@end
 //@hook hits_begin
-        hits.low = hits.t * (R(1.0) - R(8.0) * UNIT_ROUNDOFF);
+        hits.low = hits.t * choose(is_less(hits.t, (real_n)0), R(1.0) + R(8.0) * UNIT_ROUNDOFF, R(1.0) - R(8.0) * UNIT_ROUNDOFF);
 //@end

@@ -5,7 +5,7 @@
 // `bound` of one sign: accepting all of those loses no hit, whatever the rounding. The price is an edge wider by a few u of the
 // distance, where both neighbours report the hit and the nearer one stays. The traversal loses no cell (kdtree.cl).
 
-// Lanes that run nearly inside the plane: decided in float64, with the same rule. Rare, so kept out of the loop's registers.
+// Lanes that run nearly inside the plane, or start nearly on it: decided in float64, with the same rule. Rare, so kept out of the loop's registers.
 static __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n unsure,
                                                   real_n *distance) {
     lane_int test[LANES];
@@ -33,7 +33,7 @@ static __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometr
         cross_double(e1, e2, n);
         const double rate = dot_double(along, n);
         // In the plane to the last bit of float64: a miss by definition.
-        const int hit = (lowest >= -bound || highest <= bound) && fabs(rate) > 0x1p-50 * sqrt(dot_double(n, n) * dot_double(along, along));
+        const int hit = (lowest >= -bound || highest <= bound) && fabs(rate) > 0x1p-50 * sqrt(dot_double(e1, e1) * dot_double(e2, e2) * dot_double(along, along));
         test[k] = hit ? -1 : 0;
         t[k] = hit ? (real)(dot_double(p[0], n) / rate * ray_length(rays, k)) : t[k];
     }
@@ -47,7 +47,10 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
     if (!any_lane(hit)) return;
     const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared_origin);
     real_n t = plane.t;
-    const mask_n grazing = plane.grazing & hit;
+    // Where float32 cannot tell whether the hit lies before the ray's start, float64 does.
+    mask_n grazing = plane.grazing;
+    if (!shared_origin) grazing |= is_at_most(abs_n(t - rays->t_min), plane.error);
+    grazing &= hit;
     if (any_lane(grazing)) {
         // Copies go to the function: what it is given by pointer could not stay in registers here.
         const Geometry seen = *geometry;

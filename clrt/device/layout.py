@@ -38,7 +38,7 @@ def edge_planes(real: type) -> np.dtype[np.void]:
     """A triangle for rays of one shared origin: planes through it and each edge. 64 bytes in float32."""
     vector: Any = (real, (3,))
     return struct_dtype([("u", *vector), ("v", *vector), ("w", *vector), ("normal", *vector), ("offset", real), ("bound", real),
-                         ("normal_bound", real), ("unused", real)])  # fmt: skip
+                         ("normal_bound", real), ("offset_bound", real)])  # fmt: skip
 
 
 def object_record(real: type) -> np.dtype[np.void]:
@@ -68,9 +68,14 @@ def frame(real: type, extra: Sequence[Field]) -> np.dtype[np.void]:
     ])  # fmt: skip
 
 
-def light(real: type) -> np.dtype[np.void]:
-    """A point light: where it is as given, and relative to the local origin."""
-    return struct_dtype([("given", np.float64, (3,)), ("position", real, (3,)), ("color", real, (3,))])
+def light(real: type, extra: Sequence[Field] = ()) -> np.dtype[np.void]:
+    """A point light: where it is as given, and relative to the local origin; then the members of effects."""
+    return struct_dtype([("given", np.float64, (3,)), ("position", real, (3,)), ("color", real, (3,)), *extra])
+
+
+def sun(real: type) -> np.dtype[np.void]:
+    """A light infinitely far away: the unit vector to it."""
+    return struct_dtype([("direction", real, (3,)), ("color", real, (3,))])
 
 
 def sphere(real: type) -> np.dtype[np.void]:
