@@ -63,6 +63,8 @@ def render(
     device: str | None = None,
     precision: str = "watertight",
     depth: int | None = None,
+    samples: int | None = None,
+    seed: int = 0,
     count: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> Image:
@@ -72,6 +74,8 @@ def render(
     tree : "sah", or "median" for the splitter of the classic report
     device : part of a name that `devices()` lists
     depth : reflections and refractions in a row, instead of the scene's own
+    samples : rays through each pixel, instead of the scene's own; 1: one, through its centre
+    seed : of all random numbers, 0 to 2^32 - 1; the same seed gives the same picture
     count : count rays and tests in a second pass
     progress : called with a phase and how much of it is done, 0 to 1
 
@@ -86,7 +90,8 @@ def render(
     loaded = scene if isinstance(scene, Scene) else load(scene)
     read_s = time.perf_counter() - start
     image = render_scene(
-        loaded, size=size, tree=tree, device=device, precision=precision, depth=depth, count=count, progress=progress
+        loaded, size=size, tree=tree, device=device, precision=precision, depth=depth, samples=samples, seed=seed,
+        count=count, progress=progress
     )
     if image.stats is not None and loaded is not scene:
         image.stats.read_s = read_s

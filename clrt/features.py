@@ -96,7 +96,31 @@ def _globe_caller(scene: Scene) -> int | None:
     return min((scene.textures[t].line for i in used if (t := scene.materials[i].texture) >= 0), default=None)
 
 
+def _samples_caller(scene: Scene) -> int | None:
+    return scene.samples_line if scene.samples > 1 else None
+
+
+def _sampled_caller(scene: Scene) -> int | None:
+    """What is seen is the mean of samples: anything that draws random numbers calls for it."""
+    lines = [line for caller in (_samples_caller,) if (line := caller(scene)) is not None]
+    return min(lines, default=None)
+
+
 FEATURES: tuple[Feature, ...] = (
+    Feature("sampler", _sampled_caller, "sampler.cl"),
+    Feature(
+        "sampling",
+        _sampled_caller,
+        "sampling.cl",
+        frame=(("seed", np.int32, lambda scene: np.uint32(scene.seed).astype(np.int32)),),
+        parameters=(("sample_range", "global const int *sample_range"), ("sample_sums", "global double *sample_sums")),
+    ),
+    Feature(
+        "samples",
+        _samples_caller,
+        "antialias.cl",
+        frame=(("pixel_spread", REAL, lambda scene: float(scene.samples > 1)),),
+    ),
     Feature(
         "spheres",
         lambda scene: scene.spheres.line if len(scene.spheres) else None,
@@ -141,7 +165,7 @@ FEATURES: tuple[Feature, ...] = (
     ),
     Feature("bounce", _bounce_caller, "bounce.cl", frame=(("depth", np.int32, lambda scene: scene.depth),)),
 )
-HELPERS = frozenset({"globe", "bounce"})  #: parts that effects share; not effects of their own
+HELPERS = frozenset({"globe", "bounce", "sampler", "sampling"})  #: parts that effects share; not effects of their own
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from clrt.kdtree import build_tree
 from clrt.kdtree.tree import KdTree
 from clrt.precision import DEFAULT, Precision, rung
 from clrt.scene.model import Scene
+from clrt.scene.words import MOST_SAMPLES
 from clrt.stats import ObjectStats, RunStats
 
 Progress = Callable[[str, float], None]
@@ -49,6 +50,8 @@ def render(
     device: str | None = None,
     precision: str = DEFAULT,
     depth: int | None = None,
+    samples: int | None = None,
+    seed: int = 0,
     count: bool = False,
     progress: Progress | None = None,
     dump_kernel: Path | None = None,
@@ -56,11 +59,12 @@ def render(
     """The picture of `scene`, with the figures of the run in its `stats`.
 
     size : (width, height) in pixels; depth : reflections and refractions in a row, 0 to 128; count : run a second, counting pass
+    samples : rays through each pixel, instead of the scene's own; seed : of all random numbers, 0 to 2^32 - 1
     dump_kernel : where to write the OpenCL program. Raises DeviceError, LimitError, ClrtError, OSError.
     """
     start = time.perf_counter()
     tell = progress or (lambda phase, fraction: None)
-    scene = _with_options(scene, size, depth)
+    scene = _with_sampling(_with_options(scene, size, depth), samples, seed)
     ladder, opened = rung(precision), open_device(device)
     features = Features.of(scene)
     prepared = build_trees(scene, tree, tell)
@@ -76,7 +80,8 @@ def render(
     end = time.perf_counter()
     stats = RunStats(
         scene=scene.source, width=scene.camera.width, height=scene.camera.height, tree=tree, device=opened.info.name,
-        precision=precision, effects=list(features.effects), objects=_object_stats(prepared), build_s=sum(prepared.tree_s),
+        precision=precision, samples=scene.samples, seed=scene.seed,
+        effects=list(features.effects), objects=_object_stats(prepared), build_s=sum(prepared.tree_s),
         upload_s=upload_s, compile_s=compile_s, render_s=end - before, total_s=end - start,
     )  # fmt: skip
     if tracer.stages is not None:
@@ -100,6 +105,15 @@ def _with_options(scene: Scene, size: tuple[int, int] | None, depth: int | None)
     if not scene.triangle_count and not len(scene.spheres):
         raise ClrtError("the scene has nothing to render; add a triangle or a sphere")
     return scene
+
+
+def _with_sampling(scene: Scene, samples: int | None, seed: int) -> Scene:
+    samples = scene.samples if samples is None else samples
+    if not 1 <= samples <= MOST_SAMPLES:
+        raise LimitError(f"{samples} samples are out of range; a pixel has 1 to {MOST_SAMPLES:,}")
+    if not 0 <= seed < 1 << 32:
+        raise LimitError(f"the seed {seed} is out of range; it goes from 0 to {(1 << 32) - 1}")
+    return replace(scene, samples=samples, seed=seed)
 
 
 def build_trees(scene: Scene, tree: str, tell: Progress) -> Prepared:
@@ -147,20 +161,25 @@ def open_tracer(
 
 
 def run_rows(tracer: Tracer, phase: str, tell: Progress) -> None:
-    """All rows, in launches of about _LAUNCH_S each; Python sees signals between them."""
+    """All samples of all rows, in launches of about _LAUNCH_S each; Python sees signals between them."""
     scene = tracer.buffers.packed.scene
     bounces = any(f.name == "bounce" for f in tracer.buffers.features.active)
     rays_a_pixel = (1 + len(scene.lights)) * (1 + (2 * scene.depth if bounces else 0))
     rows = max(8, _FIRST_LAUNCH // (rays_a_pixel * tracer.width) // 8 * 8)
-    row = 0
-    while row < tracer.height:
-        tell(phase, row / tracer.height)
-        end = min(tracer.height, row + rows)
-        start = time.perf_counter()
-        tracer.run(row, end)
-        pace = (time.perf_counter() - start) / (end - row)
-        rows = max(8, min(8 * rows, int(_LAUNCH_S / max(pace, 1e-9)))) // 8 * 8
-        row = end
+    sampled = "sampling" in {f.name for f in tracer.buffers.features.active}
+    passes = scene.samples if sampled else 1
+    for sample in range(passes):
+        if sampled:
+            tracer.begin_sample(sample)
+        row = 0
+        while row < tracer.height:
+            tell(phase, (sample + row / tracer.height) / passes)
+            end = min(tracer.height, row + rows)
+            start = time.perf_counter()
+            tracer.run(row, end)
+            pace = (time.perf_counter() - start) / (end - row)
+            rows = max(8, min(8 * rows, int(_LAUNCH_S / max(pace, 1e-9)))) // 8 * 8
+            row = end
     tell(phase, 1.0)
 
 

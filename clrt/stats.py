@@ -48,6 +48,7 @@ class RunStats:
     total_s : from the start of the command to the written picture, without `count_s`; from Python, from `render` to the picture
     ray_counts : rays traced by kind (see RAY_KINDS), None unless counted
     decided : lanes that the rung "exact" decided in float64 and in exact arithmetic; None for other rungs
+    samples, seed : rays through each pixel; the seed of all random numbers
     effects : names of what the scene calls for, in the order of their kernels
     """
 
@@ -57,6 +58,8 @@ class RunStats:
     tree: str = ""
     device: str = ""
     precision: str = ""
+    samples: int = 1
+    seed: int = 0
     effects: list[str] = field(default_factory=list)
     objects: list[ObjectStats] = field(default_factory=list)
     ray_counts: dict[str, int] | None = None
@@ -93,8 +96,8 @@ class RunStats:
 
     @property
     def primary_rays(self) -> int:
-        """Rays from the eye: one a pixel, known without counting."""
-        return self.ray_counts.get("primary", 0) if self.ray_counts is not None else self.width * self.height
+        """Rays from the eye: `samples` a pixel, known without counting."""
+        return self.ray_counts.get("primary", 0) if self.ray_counts is not None else self.width * self.height * self.samples
 
     @property
     def rays(self) -> int | None:
@@ -120,6 +123,8 @@ class RunStats:
             "tree": self.tree,
             "device": self.device,
             "precision": self.precision,
+            "samples": self.samples,
+            "seed": self.seed,
             "effects": list(self.effects),
             **{name: round(getattr(self, name), 6) for name in _TIMES},
             "triangles": self.triangles,

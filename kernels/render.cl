@@ -24,7 +24,7 @@ render_packet(const int column, const int row, global const Frame *frame, global
     }
     //@ begin
     Rays rays;
-    camera_rays(frame, column, row, &rays);
+    //@ camera
     real_n color[3] = {(real_n)0, (real_n)0, (real_n)0}, weight = (real_n)1;
     //@ primary
     for (;;) {
@@ -56,7 +56,7 @@ render_packet(const int column, const int row, global const Frame *frame, global
     for (int k = 0; k < LANES; k++) {
         const int x = column + k % PACKET_WIDTH, y = row + k / PACKET_WIDTH;
         if (x >= frame->width || y >= end_row) continue;
-        for (int a = 0; a < 3; a++) film[3 * ((size_t)y * frame->width + x) + a] = (float)out[a][k];
+        //@ store
     }
     //@ end
 }

@@ -1,4 +1,4 @@
-// Provides: sampler_word: random words, a pure function of pixel, sample, dimension and seed; uniform_from_word: a word as a number of [0, 1).
+// Provides: sampler_word: random words, a pure function of pixel, sample, dimension and seed, and uniform_from_word: a word as a number of [0, 1).
 // Needs: lanes.cl.  Reads: REAL_BITS.
 //
 // | function          | algorithm                                             | source                     | error          |

@@ -29,6 +29,9 @@ WORDS = {
     "textures": ("textur", "texel", "albedo *="),
     "globe": ("globe", "atan2pi"),
     "bounce": ("bounce",),
+    "sampler": ("sampler",),
+    "sampling": ("sampling", "sample_range"),
+    "samples": ("antialias",),
 }
 
 
@@ -51,6 +54,7 @@ def test_source_without_an_effect_holds_none_of_its_names(feature: Feature) -> N
         "direct light": ("shadows",), "bounce": ("mirror", "refraction", "fresnel"), "refraction": ("fresnel",),
         "textures": ("globe",), "spheres": ("globe",),
     }.get(feature.name, ())  # fmt: skip
+    dependents += {"sampler": ("sampling", "samples"), "sampling": ("samples",)}.get(feature.name, ())
     left = Features(tuple(pair for pair in others.lines if pair[0] not in dependents))
     assert _traces(feature, program.compose(left, rung("watertight"), 16, SHAPE)) == []
 
@@ -93,6 +97,7 @@ def test_pairs_of_effects_compile_for_any_width(device: Device, names: tuple[str
     wanted |= {"bounce"} if {"mirror", "refraction"} & wanted else set()
     wanted |= {"spheres", "textures"} if "globe" in wanted else set()
     wanted |= {"direct light"} if "shadows" in wanted else set()
+    wanted |= {"sampler", "sampling"} if "samples" in wanted else set()
     lanes = {0: 16, 1: 8, 2: 4, 3: 1}[sum(map(ord, "".join(names))) % 4]
     program.build(device, program.compose(_features(*wanted), rung("watertight"), lanes, SHAPE))
 

@@ -66,6 +66,13 @@ def test_words_are_the_same_in_kernel_and_reference(precision: str, bits: int) -
     assert 0.0 <= u.min() <= u.max() < 1.0
 
 
+def test_one_sample_has_the_words_that_it_has_among_others() -> None:
+    pixel = np.arange(12).reshape(3, 4)
+    many = sampler.words(pixel, np.arange(5)[:, None, None], 1, 9)
+    for sample in range(5):
+        assert (sampler.words(pixel, sample, 1, 9) == many[sample]).all()
+
+
 @pytest.mark.parametrize("first", [0, 256])
 @pytest.mark.parametrize("power", [0, 1, 4, 8])
 def test_every_elementary_interval_holds_one_sample(power: int, first: int) -> None:

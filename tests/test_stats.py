@@ -12,7 +12,7 @@ from clrt.stats import RAY_KINDS, ObjectStats, RunStats
 #: the interface: keys may be added, never taken away
 KEYS = {
     "clrt", "scene", "width", "height", "tree", "device", "precision", "effects", "objects", "read_s", "build_s", "compile_s",
-    "render_s", "write_s", "total_s", "nodes", "depth", "tests_per_ray", "primary_rays", "rays", "rays_per_s", "ray_counts",
+    "render_s", "write_s", "total_s", "nodes", "depth", "tests_per_ray", "primary_rays", "rays", "rays_per_s", "ray_counts", "samples", "seed",
 }  # fmt: skip
 OBJECT_KEYS = {"name", "triangles", "nodes", "leaves", "references", "depth", "build_s", "tests_per_ray"}
 

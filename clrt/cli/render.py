@@ -30,6 +30,8 @@ class Options:
     tree: str
     device: str | None
     depth: int | None
+    samples: int | None
+    seed: int
     precision: str
     stats: Path | None
     dump_kernel: Path | None
@@ -47,6 +49,8 @@ class Options:
 @click.option("--tree", type=click.Choice(["sah", "median"]), default="sah", show_default=True, help="How the kd-trees are split.")
 @click.option("--device", metavar="NAME", help="Part of the name of an OpenCL device; `clrt devices` lists them.")
 @click.option("--depth", type=kinds.whole(0), metavar="N", help="Reflections and refractions in a row, instead of the scene's.")
+@click.option("--samples", type=kinds.whole(1, 1 << 16), metavar="N", help="Rays through each pixel, instead of the scene's.")
+@click.option("--seed", type=kinds.whole(0, (1 << 32) - 1), metavar="S", default=0, show_default=True, help="Of all random numbers.")
 @click.option(
     "--precision", metavar="NAME", default="watertight", show_default=True, help="How rays meet triangles: fast, watertight, exact, double."
 )
@@ -133,6 +137,8 @@ def _render(options: Options, scene: Scene, progress: PhaseProgress) -> Image:
         device=options.device,
         precision=options.precision,
         depth=options.depth,
+        samples=options.samples,
+        seed=options.seed,
         count=options.stats is not None,
         progress=progress,
         dump_kernel=options.dump_kernel,

@@ -237,8 +237,20 @@ def _corner_uvs(packed: Packed) -> FloatArray:
     return np.concatenate([np.zeros((0, 3, 2)), *(uvs[order] for uvs, order in zip(given, packed.orders, strict=True))])
 
 
+def _sample_range(packed: Packed) -> NDArray[np.int32]:
+    """Number of the next sample, and how many are in the sums: see sampling.cl."""
+    return np.zeros(2, np.int32)
+
+
+def _sample_sums(packed: Packed) -> NDArray[np.float64]:
+    """(h, w, 3) of the samples so far."""
+    camera = packed.scene.camera
+    return np.zeros((camera.height, camera.width, 3))
+
+
 _PACKERS: dict[str, Callable[[Packed], NDArray[Any]]] = {
     "lights": _lights, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media,
+    "sample_range": _sample_range, "sample_sums": _sample_sums,
     "textures": lambda packed: texels.records(packed.scene.textures, packed.real), "corner_uvs": _corner_uvs,
     "texels": lambda packed: texels.codes(packed.scene.textures),
     "texel_values": lambda packed: texels.values(packed.scene.textures, packed.real),

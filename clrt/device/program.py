@@ -41,7 +41,9 @@ LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, si
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
 MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
 #: what stands at a place where no effect adds anything
-_DEFAULTS = {"trace": "        scene_trace(&geometry, &rays, 1, 0, &hits);", "next": "        break;"}
+_DEFAULTS = {"trace": "        scene_trace(&geometry, &rays, 1, 0, &hits);", "next": "        break;",
+             "camera": "    camera_rays(frame, column, row, &rays);",
+             "store": "        for (int a = 0; a < 3; a++) film[3 * ((size_t)y * frame->width + x) + a] = (float)out[a][k];"}  # fmt: skip
 _PLACE = re.compile(r"^[ \t]*//@ (\w+)[ \t]*$", re.M)
 _HOOK = re.compile(r"^//@hook (\w+)\n(.*?)^//@end[ \t]*\n?", re.M | re.S)
 _COUNTING = re.compile(r"^([ \t]*)//@counting (.*)\n", re.M)

@@ -30,7 +30,8 @@ class Buffers:
         self.vertices = self.upload(packed.vertices)
         self.core = [self.upload(a) for a in (packed.nodes, packed.indices, packed.objects, packed.surfaces, packed.materials)]
         self.effects = {
-            name: self.upload(packed.argument(name)) for f in features.active for name, _ in f.parameters if name != "light_planes"
+            name: self.upload(packed.argument(name), writable=name == "sample_sums")
+            for f in features.active for name, _ in f.parameters if name != "light_planes"
         }
         self.triangles = self.empty(max(1, packed.slots) * layout.triangle(precision.real).itemsize)
         self.eye_planes = self.empty(self.plane_bytes)
@@ -132,6 +133,12 @@ class Tracer:
         self.stages = StageCounter(buffers) if buffers.precision.decides_in_stages else None
         if self.stages is not None:
             self._after += (self.stages.buffer,)
+
+    def begin_sample(self, sample: int) -> None:
+        """The next rows are those of this sample, which is added to the ones before it. For scenes that are sampled."""
+        import pyopencl as cl
+
+        cl.enqueue_copy(self.buffers.device.queue, self.buffers.effects["sample_range"], np.array([sample, sample], np.int32))
 
     def warm_up(self) -> None:
         """Launches over no rows: PoCL compiles for a local size at its first launch, which belongs to compiling."""

@@ -70,7 +70,7 @@ def _hashed(x: ArrayLike) -> NDArray[np.int64]:
 
 def _reversed(x: NDArray[np.int64]) -> NDArray[np.int64]:
     """The 32 bits in the other order."""
-    octets = np.ascontiguousarray(x.astype(">u4")).view(np.uint8).reshape(*x.shape, 4)
+    octets = np.ascontiguousarray(np.asarray(x, ">u4")).view(np.uint8).reshape(*x.shape, 4)
     bits = np.unpackbits(octets, axis=-1)[..., ::-1]
     return np.packbits(bits, axis=-1).view(">u4")[..., 0].astype(np.int64)
 

@@ -85,10 +85,13 @@ class _World:
         return stack
 
 
-def render(scene: Scene, *, directions: FloatArray | None = None, chunk_bytes: int = TILE_BYTES) -> ReferencePicture:
-    """Trace the scene's picture, one ray through each pixel's centre.
+def render(
+    scene: Scene, *, directions: FloatArray | None = None, origins: FloatArray | None = None, chunk_bytes: int = TILE_BYTES
+) -> ReferencePicture:
+    """Trace the scene's picture, one ray through each pixel's centre (clrt.reference.sampled takes many, and those of a lens).
 
     directions : (h, w, 3) of any length, in place of `scene.camera.directions()`; float32 ones are taken as the exact numbers they are
+    origins : (h, w, 3) where the rays start, in place of the eye; the media around the eye count as being around all of them
     chunk_bytes : memory for one tile of rays times triangles
     Coordinates from about 1e-60 to 1e60 keep their precision. Raises SceneError for directions that do not fit or are zero or not finite,
     for a refracting material without an index, and for primitive ids with gaps.
@@ -99,6 +102,7 @@ def render(scene: Scene, *, directions: FloatArray | None = None, chunk_bytes: i
         raise SceneError(f"directions have the shape {d.shape}; a picture of {width} x {height} takes {(height, width, 3)}")
     if not np.isfinite(d).all() or not d.any(axis=2).all():
         raise SceneError("a direction is zero or not finite; every pixel needs one")
+    eyes = np.broadcast_to(np.asarray(scene.camera.eye if origins is None else origins, np.float64), d.shape).reshape(-1, 3)
     world = _World.of(scene, chunk_bytes)
     first = world.first_media()
     picture = ReferencePicture(
@@ -107,7 +111,7 @@ def render(scene: Scene, *, directions: FloatArray | None = None, chunk_bytes: i
     )  # fmt: skip
     for start in range(0, height * width, PIXELS_AT_ONCE):
         pixel = np.arange(start, min(start + PIXELS_AT_ONCE, height * width))
-        wave = _primary(scene, d.reshape(-1, 3)[pixel], pixel, first)
+        wave = _primary(eyes[pixel], d.reshape(-1, 3)[pixel], pixel, first)
         picture.rays["primary"] += len(pixel)
         for depth in range(scene.depth + 1):
             wave = _trace(world, wave, picture, depth)
@@ -119,9 +123,8 @@ def render(scene: Scene, *, directions: FloatArray | None = None, chunk_bytes: i
                             picture.margin.reshape(shape), picture.rays)  # fmt: skip
 
 
-def _primary(scene: Scene, directions: FloatArray, pixel: IndexArray, first: MediumStack) -> _Wave:
+def _primary(origin: FloatArray, directions: FloatArray, pixel: IndexArray, first: MediumStack) -> _Wave:
     m = len(pixel)
-    origin = np.broadcast_to(np.asarray(scene.camera.eye, np.float64), (m, 3)).copy()
     rays = Rays(origin, directions, np.full(m, -1, np.int64), np.zeros(m), np.ones(m))
     return _Wave(rays, np.ones(m), pixel, first[np.zeros(m, np.int64)])
 

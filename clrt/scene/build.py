@@ -70,6 +70,7 @@ def parse_scene(
         camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,
         source, tuple(warnings), textures=textured.textures,
     )  # fmt: skip
+    scene = replace(scene, samples=draft.samples, samples_line=draft.samples_line)
     return _mirrored(scene) if right_handed else scene
 
 

@@ -177,6 +177,8 @@ class Scene:
     """Everything a picture depends on. Built by `clrt.scene.build` from a text, or by hand.
 
     `depth` is the greatest number of reflections and refractions in a row (0: none are followed).
+    `samples` is how many rays go through each pixel from the eye, 1: one, through its centre; `samples_line` asks for them (0: no text).
+    `seed` is that of the random numbers, 0 to 2^32 - 1.
     `warnings` are counted facts worth telling, one line each, such as degenerate triangles.
     """
 
@@ -190,6 +192,9 @@ class Scene:
     source: str = "<scene>"
     warnings: tuple[str, ...] = ()
     textures: tuple[Texture, ...] = ()
+    samples: int = 1
+    samples_line: int = 0
+    seed: int = 0
 
     @property
     def triangle_count(self) -> int:

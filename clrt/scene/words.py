@@ -14,6 +14,7 @@ from clrt.scene.grammar import Field, color_fields
 from clrt.scene.model import Material, PointLight
 from clrt.scene.tokens import Token, read_in_range
 
+MOST_SAMPLES = 1 << 16  #: of a pixel
 GREATEST_DEPTH = 128  #: reflections and refractions in a row; bounds the stacks of every renderer
 
 Value = float | str
@@ -66,6 +67,8 @@ class Draft:
     lights: list[PointLight] = field(default_factory=list)
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
     depth: int = 5
+    samples: int = 1
+    samples_line: int = 0
 
 
 @dataclass(frozen=True)
@@ -98,11 +101,16 @@ _PROJECT_KEYS: tuple[tuple[Field | Text | Choice, Value], ...] = (
     (Choice("axis", ("x", "y", "z")), "y"),
     (Field("scale", low=0.0, low_open=True), 1.0),
 )
+_SAMPLES = Field("samples", low=1.0, high=float(MOST_SAMPLES), whole=True)
 _DEPTH = Field("depth", low=0.0, high=float(GREATEST_DEPTH), whole=True)
 
 
 def _set_background(draft: Draft, call: WordCall) -> None:
     draft.background = (call.number("red"), call.number("green"), call.number("blue"))
+
+
+def _set_samples(draft: Draft, call: WordCall) -> None:
+    draft.samples, draft.samples_line = int(call.number("samples")), call.line
 
 
 def _set_depth(draft: Draft, call: WordCall) -> None:
@@ -127,6 +135,7 @@ def _no_change(draft: Draft, call: WordCall) -> None:
 WORDS: dict[str, Word] = {
     "background": Word(_BACKGROUND, "background 0.2 0.3 0.5", _set_background),
     "depth": Word((_DEPTH,), "depth 5", _set_depth),
+    "samples": Word((_SAMPLES,), "samples 64", _set_samples),
     "texture": Word((Text("picture"),), "texture wood.png wrap=mirror", _no_change, _TEXTURE_KEYS, once=False),
     "uv": Word(_UV, "uv 0 0 1 0 1 1", _no_change, once=False),
     "project": Word((), "project axis=y scale=2", _no_change, _PROJECT_KEYS, once=False),
