@@ -7,7 +7,7 @@ SCENE ?= scenes/first.txt
 PICTURE ?= out/$(basename $(notdir $(SCENE))).png
 
 .DEFAULT_GOAL := help
-.PHONY: help run test test-all lint bench clean
+.PHONY: help run test test-all lint bench docs clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -28,6 +28,10 @@ lint: $(VENV)/dev.stamp ## ruff and mypy
 
 bench: $(VENV)/bench.stamp ## measure, into bench-results/; BENCH=--write-docs fills the tables of the documentation
 	$(BIN)/python -m clrt.bench $(BENCH)
+
+docs: $(VENV)/bench.stamp ## fill the tables of the documentation: the hard cases, then what `make bench` measures; many minutes
+	$(BIN)/clrt verify --markdown docs/numerics.md
+	$(BIN)/python -m clrt.bench --write-docs
 
 clean: ## remove .venv, out/ and caches
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache
