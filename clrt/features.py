@@ -82,6 +82,11 @@ def _fresnel_caller(scene: Scene) -> int | None:
     return min(lines) if lines and scene.depth > 0 else None
 
 
+def _absorption_caller(scene: Scene) -> int | None:
+    lines = [m.absorb_line for m in _used_materials(scene) if m.refract > 0.0 and max(m.absorb) > 0.0]
+    return min(lines) if lines and scene.depth > 0 else None
+
+
 def _smooth_caller(scene: Scene) -> int | None:
     return min((o.line for o in scene.objects if o.vertex_normals is not None), default=None)
 
@@ -149,6 +154,7 @@ FEATURES: tuple[Feature, ...] = (
         parameters=(("media", "global const int *media"),),
         rays=("refracted", "internal"),
     ),
+    Feature("absorption", _absorption_caller, "absorb.cl", parameters=(("absorption", "global const real *absorption"),)),
     Feature("mirror", _material_caller("reflect"), "mirror.cl", material=(("reflect", REAL),), rays=("mirror",)),
     Feature("globe", _globe_caller, "globe.cl"),
     Feature(

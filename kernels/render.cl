@@ -35,6 +35,7 @@ render_packet(const int column, const int row, global const Frame *frame, global
         //@ trace
         Hit hit;
         hit_surface(&geometry, frame, surfaces, &rays, &hits, &hit);
+        //@ arrived
         // The light that leaves the hit points towards the viewer, without what other rays bring.
         real_n sum[3], ambient;
         gather(ambient, materials[hit.material[k]].ambient);
@@ -45,6 +46,7 @@ render_packet(const int column, const int row, global const Frame *frame, global
             gather(albedo, materials[hit.material[k]].color[a]);
             //@ albedo
             const real_n seen = choose(hit.found, albedo * sum[a], (real_n)frame->background[a]);
+            //@ channel
             color[a] += choose(rays.active, weight * seen, (real_n)0);
         }
         //@ spawn

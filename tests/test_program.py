@@ -24,6 +24,7 @@ WORDS = {
     "shadows": ("shadow", "light_planes"),
     "direct light": ("direct_light", "diffuse *", "pow("),
     "fresnel": ("fresnel",),
+    "absorption": ("absor",),
     "refraction": ("refract", "ior", "media"),
     "mirror": ("mirror", "reflect;"),
     "textures": ("textur", "texel", "albedo *="),
@@ -51,7 +52,7 @@ def test_source_without_an_effect_holds_none_of_its_names(feature: Feature) -> N
     with_it = program.compose(ALL, rung("watertight"), 16, SHAPE)
     assert _traces(feature, with_it), "the words looked for must occur where the effect is on"
     dependents = {
-        "direct light": ("shadows",), "bounce": ("mirror", "refraction", "fresnel"), "refraction": ("fresnel",),
+        "direct light": ("shadows",), "bounce": ("mirror", "refraction", "fresnel", "absorption"), "refraction": ("fresnel", "absorption"),
         "textures": ("globe",), "spheres": ("globe",),
     }.get(feature.name, ())  # fmt: skip
     dependents += {"sampler": ("sampling", "samples"), "sampling": ("samples",)}.get(feature.name, ())
@@ -93,7 +94,7 @@ def test_line_directives_are_true(device: Device) -> None:
 @pytest.mark.parametrize("names", list(itertools.combinations([f.name for f in FEATURES if f.name != "bounce"], 2)))
 def test_pairs_of_effects_compile_for_any_width(device: Device, names: tuple[str, str]) -> None:
     wanted = {*names}
-    wanted |= {"refraction"} if "fresnel" in wanted else set()
+    wanted |= {"refraction"} if {"fresnel", "absorption"} & wanted else set()
     wanted |= {"bounce"} if {"mirror", "refraction"} & wanted else set()
     wanted |= {"spheres", "textures"} if "globe" in wanted else set()
     wanted |= {"direct light"} if "shadows" in wanted else set()

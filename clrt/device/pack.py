@@ -248,8 +248,17 @@ def _sample_sums(packed: Packed) -> NDArray[np.float64]:
     return np.zeros((camera.height, camera.width, 3))
 
 
+def _absorption(packed: Packed) -> NDArray[Any]:
+    """(objects + spheres, 3): the coefficients of each one's medium, 0 where it lets no light through."""
+    materials = packed.scene.materials
+    rows = [materials[i].absorb if i >= 0 else (0.0, 0.0, 0.0) for i in refracting_materials(packed.scene).tolist()]
+    # No more than what a number holds: an infinite one would make a way of no length no number.
+    bounded = np.minimum(np.array(rows).reshape(-1, 3), np.finfo(packed.real).max)
+    return np.asarray(bounded, packed.real)
+
+
 _PACKERS: dict[str, Callable[[Packed], NDArray[Any]]] = {
-    "lights": _lights, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media,
+    "lights": _lights, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media, "absorption": _absorption,
     "sample_range": _sample_range, "sample_sums": _sample_sums,
     "textures": lambda packed: texels.records(packed.scene.textures, packed.real), "corner_uvs": _corner_uvs,
     "texels": lambda packed: texels.codes(packed.scene.textures),

@@ -176,7 +176,7 @@ def private_bytes(precision: Precision, lanes: int, shape: Shape, features: Feat
     """An upper estimate of the private memory of one work-item, in bytes: its stacks, twice over for inlined copies, and 16 KiB."""
     lane_bytes = lanes * precision.bits // 8
     names = {f.name for f in features.active}
-    entry = lane_bytes * (9 + (2 * MEDIA_DEPTH + 1 if "refraction" in names else 0)) + 64
+    entry = lane_bytes * (9 + (2 * MEDIA_DEPTH + 1 if "refraction" in names else 0) + (3 if "absorption" in names else 0)) + 64
     traversal = shape.stack * (2 * lane_bytes + 4) * 3
     return traversal + (entry * (shape.depth + 4) if "bounce" in names else 0) + (16 << 10)
 

@@ -46,6 +46,13 @@ class MediumStack:
         return np.where(self.count > 0, top, 1.0)
 
     @property
+    def top(self) -> IndexArray:
+        """(m,) the object whose medium is around each ray: the entry of the highest rank, -1 outside of all."""
+        rank = np.where(self._used, self.rank, -1)
+        top = np.take_along_axis(self.object, rank.argmax(axis=1)[:, None], axis=1)[:, 0]
+        return np.where(self.count > 0, top, -1)
+
+    @property
     def _used(self) -> BoolArray:
         used: BoolArray = np.arange(STACK_SIZE) < self.count[:, None]
         return used

@@ -18,7 +18,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class MaterialTable:
-    """Materials as columns, indexed by material id: color (k, 3), the others (k,); fresnel is 1 where it holds, or 0."""
+    """Materials as columns, indexed by material id: color, absorb (k, 3), the others (k,); fresnel is 1 where it holds, or 0."""
 
     color: FloatArray
     ambient: FloatArray
@@ -29,11 +29,13 @@ class MaterialTable:
     refract: FloatArray
     ior: FloatArray
     fresnel: FloatArray
+    absorb: FloatArray
 
     @classmethod
     def build(cls, scene: Scene) -> MaterialTable:
         columns = [np.array([getattr(m, name) for m in scene.materials], np.float64)
-                   for name in ("ambient", "diffuse", "specular", "exponent", "reflect", "refract", "ior", "fresnel")]  # fmt: skip
+                   for name in ("ambient", "diffuse", "specular", "exponent", "reflect", "refract", "ior",
+                                "fresnel", "absorb")]  # fmt: skip
         table = cls(np.array([m.color for m in scene.materials], np.float64).reshape(-1, 3), *columns)
         bad = np.flatnonzero((table.refract > 0.0) & ~(table.ior > 0.0))
         if len(bad):

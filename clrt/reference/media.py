@@ -41,6 +41,26 @@ def _box(prims: Primitives, members: IndexArray) -> tuple[FloatArray, FloatArray
     return prims.vertices[members].min((0, 1)), prims.vertices[members].max((0, 1))
 
 
+def absorption(prims: Primitives, materials: MaterialTable) -> FloatArray:
+    """(objects + 1, 3) coefficients a scene unit of each object's medium, that of its first material that lets light through; last, 0."""
+    result = np.zeros((int(prims.object_id.max(initial=-1)) + 2, 3))
+    through = np.flatnonzero(materials.refract[prims.material] > 0.0)
+    for k in np.unique(prims.object_id[through]):
+        result[k] = materials.absorb[prims.material[through[prims.object_id[through] == k]].min()]
+    return result
+
+
+def transmittance(coefficients: FloatArray, length: FloatArray) -> FloatArray:
+    """(m, 3) what a way of `length` (m,) leaves of light, by Beer and Lambert; coefficients (m, 3).
+
+    An endless way leaves all where the coefficient is 0.
+    """
+    absorbs = coefficients > 0.0
+    optical = np.multiply(coefficients, length[:, None], where=absorbs, out=np.zeros_like(coefficients))
+    left: FloatArray = np.exp(-optical)
+    return left
+
+
 def around(prims: Primitives, rank: IndexArray, point: FloatArray, tile_bytes: int) -> list[int]:
     """Objects of glass around `point`, by rank: spheres it is inside of, meshes that all probes leave by an odd number of walls."""
     m = 2 * len(PROBES)

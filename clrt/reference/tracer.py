@@ -5,7 +5,7 @@ It follows docs/conventions.md to the letter and shares no code with the devices
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,12 +48,13 @@ class ReferencePicture:
 
 @dataclass(frozen=True, eq=False)
 class _Wave:
-    """All rays of one depth: what they contribute to which pixel, and the media they are in."""
+    """All rays of one depth: what they contribute to which pixel, what media have left of it (m, 3), and the media they are in."""
 
     rays: Rays
     weight: FloatArray
     pixel: IndexArray
     stack: MediumStack
+    tint: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +63,15 @@ class _World:
     prims: Primitives
     materials: MaterialTable
     rank: IndexArray
+    absorption: FloatArray
     tile_bytes: int
 
     @classmethod
     def of(cls, scene: Scene, tile_bytes: int) -> _World:
         prims, materials = Primitives.build(scene), MaterialTable.build(scene)
-        return cls(scene, prims, materials, media.ranks(prims, materials), tile_bytes)
+        # Without depth no light goes through glass, and media are not followed.
+        absorption = media.absorption(prims, materials) * (scene.depth > 0)
+        return cls(scene, prims, materials, media.ranks(prims, materials), absorption, tile_bytes)
 
     @property
     def walls_may_coincide(self) -> bool:
@@ -126,7 +130,7 @@ def render(
 def _primary(origin: FloatArray, directions: FloatArray, pixel: IndexArray, first: MediumStack) -> _Wave:
     m = len(pixel)
     rays = Rays(origin, directions, np.full(m, -1, np.int64), np.zeros(m), np.ones(m))
-    return _Wave(rays, np.ones(m), pixel, first[np.zeros(m, np.int64)])
+    return _Wave(rays, np.ones(m), pixel, first[np.zeros(m, np.int64)], np.ones((m, 3)))
 
 
 def _trace(world: _World, wave: _Wave, picture: ReferencePicture, depth: int) -> _Wave:
@@ -135,9 +139,11 @@ def _trace(world: _World, wave: _Wave, picture: ReferencePicture, depth: int) ->
     if depth == 0:
         picture.prim_id[wave.pixel], picture.t[wave.pixel] = prim, t
     np.minimum.at(picture.margin, wave.pixel, margin)
+    left = wave.tint * media.transmittance(world.absorption[wave.stack.top], t * wave.rays.speed)
+    wave = replace(wave, tint=left, weight=np.where(left.any(axis=1), wave.weight, 0.0))
     missed, hit = np.flatnonzero(prim < 0), np.flatnonzero(prim >= 0)
     background = np.array(world.scene.background, np.float64)
-    np.add.at(picture.pixels, wave.pixel[missed], wave.weight[missed, None] * background)
+    np.add.at(picture.pixels, wave.pixel[missed], wave.weight[missed, None] * left[missed] * background)
     wave, prim, t = _select(wave, hit), prim[hit], t[hit]
     surface = surfaces(world.prims, wave.rays, prim, t)
     color, margin, shadow_rays = local_color(
@@ -146,14 +152,14 @@ def _trace(world: _World, wave: _Wave, picture: ReferencePicture, depth: int) ->
     picture.rays["shadow"] += shadow_rays
     tint, sharpness = tints(world.scene, world.prims, surface)
     color, margin = color * tint, np.minimum(margin, sharpness)
-    np.add.at(picture.pixels, wave.pixel, wave.weight[:, None] * color)
+    np.add.at(picture.pixels, wave.pixel, wave.weight[:, None] * wave.tint * color)
     np.minimum.at(picture.margin, wave.pixel, margin)
     return _next(world, wave, surface, t, picture) if depth < world.scene.depth else _select(wave, np.zeros(0, np.int64))
 
 
 def _select(wave: _Wave, rows: IndexArray) -> _Wave:
     rays = Rays(*(getattr(wave.rays, name)[rows] for name in ("origin", "direction", "own", "pos_err", "dir_err")))
-    return _Wave(rays, wave.weight[rows], wave.pixel[rows], wave.stack[rows])
+    return _Wave(rays, wave.weight[rows], wave.pixel[rows], wave.stack[rows], wave.tint[rows])
 
 
 def _next(world: _World, wave: _Wave, surface: Surface, t: FloatArray, picture: ReferencePicture) -> _Wave:
@@ -173,4 +179,4 @@ def _next(world: _World, wave: _Wave, surface: Surface, t: FloatArray, picture: 
     above, behind = wave.stack[up], b.behind[down]
     stack = MediumStack(*(np.concatenate([getattr(above, n), getattr(behind, n)]) for n in ("object", "ior", "rank", "count")))
     rays = Rays(surface.point[both], direction, surface.prim[both], pos_err, dir_err)
-    return _Wave(rays, weight, wave.pixel[both], stack)
+    return _Wave(rays, weight, wave.pixel[both], stack, wave.tint[both])

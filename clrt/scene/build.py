@@ -9,6 +9,8 @@ from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
 from clrt.scene.camera import build_camera
 from clrt.scene.faults import Faults
 from clrt.scene.grammar import LETTERS
@@ -64,6 +66,8 @@ def parse_scene(
     draft = Draft(textured.materials(_materials(found)), _lights(found))
     for call in found.words:
         WORDS[call.name].apply(draft, call)
+    _check_absorption(objects, draft.materials, found, faults)
+    faults.raise_if_any()
     if not draft.lights:
         warnings.append("there is no light (L); only the ambient part of the materials is seen")
     scene = Scene(
@@ -123,6 +127,17 @@ def _check_glass_words(found: Declarations, faults: Faults) -> None:
             first[call.name, material] = call.line
             continue
         faults.add(call.line, call.column, fault)
+
+
+def _check_absorption(objects: tuple[MeshObject, ...], materials: list[Material], found: Declarations, faults: Faults) -> None:
+    """A medium fills its object whole: all glass of an object absorbs alike."""
+    for item in objects:
+        glass = [materials[i] for i in np.unique(item.material_ids).tolist() if materials[i].refract > 0.0]
+        if len({m.absorb for m in glass}) < 2:
+            continue
+        line = min(m.absorb_line for m in glass if m.absorb_line)
+        what = f"the glass of {item.name} absorbs differently from face to face; close its parts with O lines, or give all of it one absorb"
+        faults.add(line, found.token(line, 0).column, what)
 
 
 def _in_order(found: Declarations, letter: str) -> list[tuple[int, list[float]]]:

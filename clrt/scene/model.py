@@ -76,7 +76,8 @@ class Material:
     """The homework's material. `line` is where the scene text defines it (0: not from a text).
 
     fresnel : Fresnel's equations split `refract` between the reflected and the refracted ray; `reflect` is 0 then
-    fresnel_line : the line that says so (0: none)
+    absorb : how much of red, green, blue the medium behind the surface swallows a scene unit: exp(-absorb * length) is left
+    fresnel_line, absorb_line : the lines that say so (0: none)
     texture : index into Scene.textures of the picture that multiplies the colour, -1 for none
     """
 
@@ -91,6 +92,8 @@ class Material:
     line: int = 0
     fresnel: bool = False
     fresnel_line: int = 0
+    absorb: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    absorb_line: int = 0
     texture: int = -1
 
 

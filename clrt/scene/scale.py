@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from clrt.scene.model import FloatArray, PointLight, Scene, SpotLight
+from clrt.scene.model import FloatArray, Material, PointLight, Scene, SpotLight
 
 _ORDINARY = 20  #: scenes between 2^-20 and 2^20 stay as they are: their products stay within 2^-60 and 2^60
 
@@ -35,7 +35,7 @@ def at_working_size(scene: Scene) -> Scene:
 
 
 def scaled(scene: Scene, exponent: int) -> Scene:
-    """All lengths of `scene` times 2^exponent. Directions, angles, colours and indices stay."""
+    """All lengths of `scene` times 2^exponent, and what is given a length divided by it. Directions, angles, colours and indices stay."""
 
     def times(values: FloatArray) -> FloatArray:
         return np.asarray(np.ldexp(values, exponent))
@@ -44,8 +44,13 @@ def scaled(scene: Scene, exponent: int) -> Scene:
         x, y, z = times(np.asarray(light.position, np.float64)).tolist()
         return replace(light, position=(x, y, z))
 
+    def thinned(material: Material) -> Material:
+        red, green, blue = np.ldexp(material.absorb, -exponent).tolist()
+        return replace(material, absorb=(red, green, blue))
+
     return replace(
         scene,
+        materials=tuple(map(thinned, scene.materials)),
         camera=replace(scene.camera, eye=times(scene.camera.eye)),
         objects=tuple(replace(o, vertices=times(o.vertices)) for o in scene.objects),
         spheres=replace(scene.spheres, centers=times(scene.spheres.centers), radii=times(scene.spheres.radii)),

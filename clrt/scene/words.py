@@ -132,7 +132,14 @@ def _no_change(draft: Draft, call: WordCall) -> None:
     """For words whose lines scene/textures.py reads: they hold for the material or the triangle above them."""
 
 
+def _set_absorb(draft: Draft, call: WordCall) -> None:
+    i = _material_above(draft, call)
+    absorb = (call.number("red"), call.number("green"), call.number("blue"))
+    draft.materials[i] = replace(draft.materials[i], absorb=absorb, absorb_line=call.line)
+
+
 WORDS: dict[str, Word] = {
+    "absorb": Word(color_fields(), "absorb 0.8 0.2 0.1", _set_absorb, of_glass=True),
     "background": Word(_BACKGROUND, "background 0.2 0.3 0.5", _set_background),
     "depth": Word((_DEPTH,), "depth 5", _set_depth),
     "samples": Word((_SAMPLES,), "samples 64", _set_samples),
