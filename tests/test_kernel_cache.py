@@ -50,6 +50,19 @@ def test_mark_of_a_dead_process_empties_the_folder(tmp_path: Path, monkeypatch: 
     assert not list(tmp_path.iterdir())
 
 
+def test_only_what_pocl_made_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
+    for name in ("AB", "mine", "OPUS"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "file").touch()
+    for name in ("tempfile_0FDQes", "thesis.tex", "clrt-loading-999999999"):
+        (tmp_path / name).touch()
+    (tmp_path / "CD").symlink_to(tmp_path / "mine")
+    assert kernel_cache.clear_if_one_died()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["CD", "OPUS", "mine", "thesis.tex"]
+    assert (tmp_path / "mine" / "file").exists()
+
+
 def test_folder_stays_while_another_process_loads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
     (tmp_path / "AB").mkdir()

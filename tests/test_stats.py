@@ -12,7 +12,8 @@ from clrt.stats import RAY_KINDS, ObjectStats, RunStats
 #: the interface: keys may be added, never taken away
 KEYS = {
     "clrt", "scene", "width", "height", "tree", "device", "precision", "effects", "objects", "read_s", "build_s", "compile_s",
-    "render_s", "write_s", "total_s", "nodes", "depth", "tests_per_ray", "primary_rays", "rays", "rays_per_s", "ray_counts", "samples", "seed",
+    "render_s", "write_s", "total_s", "nodes", "depth", "tests_per_ray", "primary_rays", "rays", "rays_per_s", "ray_counts",
+    "samples", "seed", "decided", "count_s", "upload_s", "triangles", "primary_rays_per_s",
 }  # fmt: skip
 OBJECT_KEYS = {"name", "triangles", "nodes", "leaves", "references", "depth", "build_s", "tests_per_ray"}
 

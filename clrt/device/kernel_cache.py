@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import os
+import re
 import shutil
 import stat
 import tempfile
@@ -18,6 +19,7 @@ from pathlib import Path
 
 VARIABLE = "POCL_CACHE_DIR"
 _MARK = "clrt-loading-"
+_POCLS = re.compile(r"[A-P]{2}|tempfile_\w+")  #: entries of PoCL; POCL_CACHE_DIR may name a folder with files of the user's
 
 
 def choose_folder() -> Path:
@@ -66,13 +68,15 @@ def _writable(folder: Path) -> bool:
 
 
 def clear() -> None:
-    """Empties PoCL's folder; what cannot be removed stays."""
+    """Removes what PoCL made in its folder; what cannot be removed stays, and so does whatever else lies there."""
     folder = Path(os.environ.get(VARIABLE, ""))
     if VARIABLE in os.environ and folder.is_dir():
         for entry in folder.iterdir():
-            if entry.is_dir() and not entry.is_symlink():
+            if not _POCLS.fullmatch(entry.name) or entry.is_symlink():
+                continue
+            if entry.is_dir():
                 shutil.rmtree(entry, ignore_errors=True)
-            elif not entry.name.startswith(_MARK):
+            else:
                 with suppress(OSError):
                     entry.unlink()
 
