@@ -129,6 +129,7 @@ class Result:
         wrong = self.outcome.wrong
         counts = [(rung, wrong.get(rung)) for rung in rungs if rung in self.case.promised]
         faults = [f"{rung}: {count:,} of {self.outcome.rays:,} wrong" for rung, count in counts if count]
+        faults += [f"{rung}: promised, and not judged" for rung, count in counts if count is None]
         if not self.outcome.naive:
             faults.append("the naive variant is right, so that the case proves nothing")
         return faults
