@@ -23,7 +23,7 @@ def atomic_write(path: str | PathLike[str]) -> Iterator[BinaryIO]:
 
     Raises OSError; where writing itself fails, as on a full disk, with `path` in it.
     """
-    target = os.path.realpath(path)
+    target = _target(path)
     in_place = os.path.exists(target) and not os.path.isfile(target)
     part = target if in_place else os.path.join(os.path.dirname(target), f".clrt-{os.urandom(6).hex()}.part")
     try:
@@ -37,6 +37,12 @@ def atomic_write(path: str | PathLike[str]) -> Iterator[BinaryIO]:
         if error.errno is None or error.filename not in (None, part):
             raise
         raise OSError(error.errno, os.strerror(error.errno), os.fspath(path)) from error
+
+
+def _target(path: str | PathLike[str]) -> str:
+    """Where links lead, but not those to open pipes, as /dev/stdout may be one: a pipe has no path."""
+    name = os.fspath(path)
+    return os.path.realpath(name) if os.path.isfile(name) or not os.path.exists(name) else name
 
 
 @contextlib.contextmanager
@@ -66,7 +72,7 @@ def discard_unfinished() -> None:
 
 def check_writable(path: str | PathLike[str]) -> None:
     """Raise OSError, with the path in it, where `path` cannot be written: to be said before a long run, not after it."""
-    name, target = os.fspath(path), Path(os.path.realpath(path))
+    name, target = os.fspath(path), Path(_target(path))
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, "this is a folder; give the name of a file", name)
     if not target.parent.is_dir():

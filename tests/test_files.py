@@ -121,3 +121,17 @@ def test_check_writable_without_permission_is_refused(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(PermissionError, match="no permission"):
         check_writable(tmp_path / "a.png")
+
+
+@pytest.mark.skipif(not os.path.isdir("/dev/fd"), reason="the system has no /dev/fd")
+def test_pipe_that_has_no_path_is_written_to() -> None:
+    reader, writer = os.pipe()
+    try:
+        path = f"/dev/fd/{writer}"
+        check_writable(path)
+        with atomic_write(path) as file:
+            file.write(b"figures")
+        assert os.read(reader, 100) == b"figures"
+    finally:
+        os.close(reader)
+        os.close(writer)
