@@ -31,6 +31,7 @@ class Feature:
     kernel : its file in kernels/
     early : its file stands before the scene's traversal, which calls it
     material : members it adds to the Material struct; each is an attribute of `scene.model.Material`
+    light : members it adds to the Light struct: name, type, shape if it is no scalar
     frame : members it adds to the Frame struct, with their values
     parameters : kernel arguments it adds: name of the packer in device/pack.py -> C declaration
     rays : kinds of rays it spawns, as the counters name them
@@ -41,6 +42,7 @@ class Feature:
     kernel: str
     early: bool = False
     material: tuple[tuple[str, Any], ...] = ()
+    light: tuple[tuple[Any, ...], ...] = ()
     frame: tuple[tuple[str, Any, Callable[[Scene], Any]], ...] = ()
     parameters: tuple[tuple[str, str], ...] = ()
     rays: tuple[str, ...] = ()
@@ -64,12 +66,24 @@ def _material_caller(attribute: str) -> Caller:
 
 
 def _light_caller(scene: Scene) -> int | None:
-    return min((light.line for light in scene.lights), default=None)
+    return min((light.line for light in scene.lights_with_position), default=None)
+
+
+def _spot_caller(scene: Scene) -> int | None:
+    return min((spot.line for spot in scene.spots), default=None)
+
+
+def _sun_caller(scene: Scene) -> int | None:
+    return min((sun.line for sun in scene.suns), default=None)
+
+
+def _can_shadow(scene: Scene) -> bool:
+    """Something can stand in a light's way: a lone flat triangle cannot shadow itself, a curved one and a sphere can."""
+    return scene.triangle_count > 1 or len(scene.spheres) > 0 or _smooth_caller(scene) is not None
 
 
 def _shadow_caller(scene: Scene) -> int | None:
-    """A light, and something that can stand in its way: a lone flat triangle cannot shadow itself, a curved one and a sphere can."""
-    return _light_caller(scene) if scene.triangle_count > 1 or len(scene.spheres) or _smooth_caller(scene) is not None else None
+    return _light_caller(scene) if _can_shadow(scene) else None
 
 
 def _bounce_caller(scene: Scene) -> int | None:
@@ -142,8 +156,19 @@ FEATURES: tuple[Feature, ...] = (
         "direct light",
         _light_caller,
         "light_point.cl",
-        frame=(("light_count", np.int32, lambda scene: len(scene.lights)),),
+        frame=(("light_count", np.int32, lambda scene: len(scene.lights_with_position)),),
         parameters=(("lights", "global const Light *lights"),),
+    ),
+    Feature("spot", _spot_caller, "spot.cl", early=True, light=(("axis", REAL, (3,)), ("edge", REAL), ("slope", REAL))),
+    Feature(
+        "sun shadows", lambda scene: _sun_caller(scene) if _can_shadow(scene) else None, "sun_visible.cl", rays=("shadow",)
+    ),
+    Feature(
+        "sun",
+        _sun_caller,
+        "sun.cl",
+        frame=(("sun_count", np.int32, lambda scene: len(scene.suns)),),
+        parameters=(("suns", "global const Sun *suns"),),
     ),
     Feature("fresnel", _fresnel_caller, "fresnel.cl", material=(("fresnel", np.int32),), rays=("fresnel",)),
     Feature(
@@ -199,4 +224,4 @@ class Features:
     @property
     def ray_kinds(self) -> tuple[str, ...]:
         """The kinds of rays that exist at all; the eye's first."""
-        return ("primary", *(kind for f in self.active for kind in f.rays))
+        return tuple(dict.fromkeys(("primary", *(kind for f in self.active for kind in f.rays))))

@@ -164,7 +164,7 @@ def run_rows(tracer: Tracer, phase: str, tell: Progress) -> None:
     """All samples of all rows, in launches of about _LAUNCH_S each; Python sees signals between them."""
     scene = tracer.buffers.packed.scene
     bounces = any(f.name == "bounce" for f in tracer.buffers.features.active)
-    rays_a_pixel = (1 + len(scene.lights)) * (1 + (2 * scene.depth if bounces else 0))
+    rays_a_pixel = (1 + len(scene.lights_with_position) + len(scene.suns)) * (1 + (2 * scene.depth if bounces else 0))
     rows = max(8, _FIRST_LAUNCH // (rays_a_pixel * tracer.width) // 8 * 8)
     sampled = "sampling" in {f.name for f in tracer.buffers.features.active}
     passes = scene.samples if sampled else 1

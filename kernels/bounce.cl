@@ -88,3 +88,6 @@ HOT void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
         if (!bounce_pop(&bounces, &current, frame->extent, &rays)) break;
         weight = current.weight;
 //@end
+//@hook light_origin
+            from_eye = current.from_eye;
+//@end

@@ -102,3 +102,10 @@ HOT void smooth_lift(const Geometry *geometry, Hit *hit) {
 //@hook shadow_skip
     rays.skip |= hit->curved & is_at_least(dot_n(hit->geometric, rays.direction), (real_n)0);
 //@end
+//@hook sun_start
+    for (int a = 0; a < 3; a++) {
+        start[a] += hit->lift[a];
+        error += (R(8.0) * UNIT_ROUNDOFF) * abs_n(hit->lift[a]);
+    }
+    own |= hit->curved & is_at_most(dot_n(hit->geometric, to_light), (real_n)0);
+//@end

@@ -55,6 +55,7 @@ HOT void sphere_trace(const Geometry *geometry, const Rays *rays, const int any_
         const real_n discriminant = sphere->radius * sphere->radius - dot_n(nearest, nearest);
         // A ray that starts on the sphere meets it whatever the rounding of its discriminant says.
         mask_n meets = rays->active & (is_at_least(discriminant, (real_n)0) | (any_hit ? NO_LANES : own));
+        //@ sphere_meets
         const real_n length = sqrt(dot_n(f, f)), tangent = (R(16.0) * UNIT_ROUNDOFF) * sphere->radius * length;
         mask_n unsure = rays->active & ~own & is_at_most(abs_n(discriminant), tangent);
         if (!any_lane(meets | unsure)) continue;
@@ -67,6 +68,7 @@ HOT void sphere_trace(const Geometry *geometry, const Rays *rays, const int any_
         if (REAL_BITS == 32 && any_lane(unsure)) meets = (meets & ~unsure) | sphere_double(sphere, rays, unsure, &t);
         if (any_hit) t = choose(own, choose(is_less(abs_n(first - hits->t), abs_n(second - hits->t)), second, first), t);
         else t = choose(own, R(2.0) * b, t);
+        //@ sphere_root
         const mask_n hit = meets & is_greater(t, rays->t_min) & is_less(t, hits->t);
         hits->t = choose(hit, t, hits->t);
         hits->slot = choose(hit, (mask_n)(geometry->slot_count + i), hits->slot);

@@ -33,6 +33,8 @@ def _offsets_on_device(device: Device, name: str, dtype: np.dtype[np.void]) -> l
         ("Object", layout.object_record),
         ("Surface", layout.surface),
         ("Light", layout.light),
+        ("Light", lambda real: layout.light(real, [("axis", real, (3,)), ("edge", real)])),
+        ("Sun", layout.sun),
         ("Sphere", layout.sphere),
         ("Material", lambda real: layout.material(real, [("reflect", real)])),
         ("Frame", lambda real: layout.frame(real, [("light_count", np.int32)])),

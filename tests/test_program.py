@@ -22,7 +22,10 @@ WORDS = {
     "spheres": ("sphere",),
     "smooth": ("smooth", "corner_normals"),
     "shadows": ("shadow", "light_planes"),
-    "direct light": ("direct_light", "diffuse *", "pow("),
+    "direct light": ("direct_light",),
+    "spot": ("spot", "slope"),
+    "sun shadows": ("sun_reached", "sun_visible"),
+    "sun": ("sun_light", "suns"),
     "fresnel": ("fresnel",),
     "absorption": ("absor",),
     "refraction": ("refract", "ior", "media"),
@@ -52,8 +55,8 @@ def test_source_without_an_effect_holds_none_of_its_names(feature: Feature) -> N
     with_it = program.compose(ALL, rung("watertight"), 16, SHAPE)
     assert _traces(feature, with_it), "the words looked for must occur where the effect is on"
     dependents = {
-        "direct light": ("shadows",), "bounce": ("mirror", "refraction", "fresnel", "absorption"), "refraction": ("fresnel", "absorption"),
-        "textures": ("globe",), "spheres": ("globe",),
+        "direct light": ("shadows", "spot"), "sun": ("sun shadows",), "bounce": ("mirror", "refraction", "fresnel", "absorption"),
+        "refraction": ("fresnel", "absorption"), "textures": ("globe",), "spheres": ("globe",),
     }.get(feature.name, ())  # fmt: skip
     dependents += {"sampler": ("sampling", "samples"), "sampling": ("samples",)}.get(feature.name, ())
     left = Features(tuple(pair for pair in others.lines if pair[0] not in dependents))
@@ -97,7 +100,8 @@ def test_pairs_of_effects_compile_for_any_width(device: Device, names: tuple[str
     wanted |= {"refraction"} if {"fresnel", "absorption"} & wanted else set()
     wanted |= {"bounce"} if {"mirror", "refraction"} & wanted else set()
     wanted |= {"spheres", "textures"} if "globe" in wanted else set()
-    wanted |= {"direct light"} if "shadows" in wanted else set()
+    wanted |= {"direct light"} if {"shadows", "spot"} & wanted else set()
+    wanted |= {"sun"} if "sun shadows" in wanted else set()
     wanted |= {"sampler", "sampling"} if "samples" in wanted else set()
     lanes = {0: 16, 1: 8, 2: 4, 3: 1}[sum(map(ord, "".join(names))) % 4]
     program.build(device, program.compose(_features(*wanted), rung("watertight"), lanes, SHAPE))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.device import layout, texels
-from clrt.device.program import MEDIA_DEPTH, frame_dtype, material_dtype
+from clrt.device.program import MEDIA_DEPTH, frame_dtype, light_dtype, material_dtype
 from clrt.features import Features
 from clrt.kdtree.arrays import LEAF
 from clrt.kdtree.tree import KdTree
@@ -24,6 +24,8 @@ from clrt.scene.media import around_eye, ranks, refracting_materials
 from clrt.scene.model import MeshObject, Scene
 
 FloatArray = NDArray[np.float64]
+
+STEEPEST_EDGE = 1e30  #: slope of a spot's hard edge: any rounding error times it is past the whole step
 
 
 def local_origin(scene: Scene) -> FloatArray:
@@ -92,6 +94,7 @@ class Packed:
     prim_ids: NDArray[np.int64]
     orders: tuple[NDArray[np.int64], ...]
     real: type[np.floating]
+    features: Features
 
     @property
     def slots(self) -> int:
@@ -130,6 +133,7 @@ def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: P
         prim_ids=_prim_ids(scene, orders),
         orders=tuple(orders),
         real=real,
+        features=features,
     )
 
 
@@ -196,10 +200,27 @@ def _frame(
 
 
 def _lights(packed: Packed) -> NDArray[np.void]:
-    records = np.zeros(len(packed.scene.lights), layout.light(packed.real))
-    for i, light in enumerate(packed.scene.lights):
+    """Point lights, then spots; where there are spots, each with its cone (spot.cl), that of a point light being all around it."""
+    scene = packed.scene
+    records = np.zeros(len(scene.lights_with_position), light_dtype(packed.features, packed.real))
+    for i, light in enumerate(scene.lights_with_position):
         records["given"][i], records["color"][i] = light.position, light.color
         records["position"][i] = np.asarray(light.position) - packed.origin
+    if scene.spots:
+        records["edge"], records["slope"] = 3.0, STEEPEST_EDGE
+        cones = records[len(scene.lights) :]
+        outer, inner = np.array([(spot.outer, spot.inner) for spot in scene.spots]).T
+        # 1 - cos; and cos b - cos a as a product, which keeps the digits of narrow rims.
+        rim = 2.0 * np.sin((outer + inner) / 2.0) * np.sin((outer - inner) / 2.0)
+        cones["axis"], cones["edge"] = [spot.direction for spot in scene.spots], 2.0 * np.sin(outer / 2.0) ** 2
+        cones["slope"] = 1.0 / np.maximum(rim, 1.0 / STEEPEST_EDGE)
+    return records
+
+
+def _suns(packed: Packed) -> NDArray[np.void]:
+    records = np.zeros(len(packed.scene.suns), layout.sun(packed.real))
+    for i, sun in enumerate(packed.scene.suns):
+        records["direction"][i], records["color"][i] = sun.direction, sun.color
     return records
 
 
@@ -258,7 +279,7 @@ def _absorption(packed: Packed) -> NDArray[Any]:
 
 
 _PACKERS: dict[str, Callable[[Packed], NDArray[Any]]] = {
-    "lights": _lights, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media, "absorption": _absorption,
+    "lights": _lights, "suns": _suns, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media, "absorption": _absorption,
     "sample_range": _sample_range, "sample_sums": _sample_sums,
     "textures": lambda packed: texels.records(packed.scene.textures, packed.real), "corner_uvs": _corner_uvs,
     "texels": lambda packed: texels.codes(packed.scene.textures),

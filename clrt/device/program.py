@@ -16,7 +16,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -90,7 +90,9 @@ def _structs(features: Features, precision: Precision, entry: str) -> str:
         ("Surface", layout.surface(real)), ("Material", material_dtype(features, precision)), ("Frame", frame_dtype(features, precision)),
     ]  # fmt: skip
     declared = " ".join(declaration for f in features.active for _, declaration in f.parameters)
-    optional = (("Light", layout.light), ("Sphere", layout.sphere), ("Texture", layout.texture))
+    optional = (
+        ("Light", partial(light_dtype, features)), ("Sphere", layout.sphere), ("Texture", layout.texture), ("Sun", layout.sun),
+    )  # fmt: skip
     names += [(name, make(real)) for name, make in optional if f" {name} " in declared]
     if entry == "cast":
         names += [("GivenRay", layout.GIVEN_RAY), ("HitSource", layout.HIT_SOURCE), ("HitRecord", layout.HIT_RECORD)]
@@ -99,6 +101,10 @@ def _structs(features: Features, precision: Precision, entry: str) -> str:
 
 def material_dtype(features: Features, precision: Precision) -> np.dtype[np.void]:
     return layout.material(precision.real, [(n, precision.real if t is REAL else t) for f in features.active for n, t in f.material])
+
+
+def light_dtype(features: Features, real: type) -> np.dtype[np.void]:
+    return layout.light(real, [(n, real if t is REAL else t, *shape) for f in features.active for n, t, *shape in f.light])
 
 
 def frame_dtype(features: Features, precision: Precision) -> np.dtype[np.void]:

@@ -23,7 +23,7 @@ class Buffers:
     def __init__(self, device: Device, packed: Packed, features: Features, precision: Precision) -> None:
         self.device, self.packed, self.features, self.precision = device, packed, features, precision
         self.plane_bytes = max(1, packed.slots) * layout.edge_planes(precision.real).itemsize
-        lights = len(packed.scene.lights)
+        lights = len(packed.scene.lights_with_position)
         self.shared_lights = self.plane_bytes * lights <= min(device.handle.max_mem_alloc_size, device.handle.global_mem_size // 4)
         self._check_memory()
         self.frame = self.upload(packed.frame)
@@ -74,7 +74,7 @@ class Buffers:
         packed, queue, local = self.packed, self.device.queue, (_PREPARE_LOCAL,)
         kernel(queue, size, local, self.vertices, _double4(packed.scene.camera.eye), self.eye_planes, np.int32(0), count)
         if "light_planes" in self.effects and self.shared_lights:
-            for i, light in enumerate(packed.scene.lights):
+            for i, light in enumerate(packed.scene.lights_with_position):
                 first = np.int32(i * packed.slots)
                 kernel(queue, size, local, self.vertices, _double4(np.asarray(light.position)), self.effects["light_planes"], first, count)
 

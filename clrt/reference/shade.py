@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from clrt.reference.crossings import Rays
 from clrt.reference.geometry import MaterialTable, Primitives
+from clrt.reference.lights import Light, cone, positions
 from clrt.reference.terminator import face_between, lifts
 from clrt.reference.visibility import occluded
-from clrt.scene.model import PointLight
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -109,7 +109,7 @@ def _interpolated(prims: Primitives, tri: IndexArray, weights: FloatArray) -> Fl
 
 
 def local_color(
-    prims: Primitives, materials: MaterialTable, lights: tuple[PointLight, ...], surface: Surface, weight: FloatArray, tile_bytes: int
+    prims: Primitives, materials: MaterialTable, lights: tuple[Light, ...], surface: Surface, weight: FloatArray, tile_bytes: int
 ) -> tuple[FloatArray, FloatArray, int]:
     """C (Ka + sum over lights of visible Lrgb (Kd N.L + Ks (R.V)^exponent)).
 
@@ -122,11 +122,12 @@ def local_color(
     shadow_rays = 0
     for light in lights:
         power = materials.color[ids] * np.array(light.color)
-        shine, lit, close = _light_term(materials, surface, np.array(light.position), np.abs(power).max(axis=1, initial=0.0) * weight)
+        position = positions(light, prims, surface.point)
+        shine, lit, close = _light_term(materials, surface, light, position, np.abs(power).max(axis=1, initial=0.0) * weight)
         margin = np.minimum(margin, close)
         traced = np.flatnonzero(lit & (shine != 0.0) & (power != 0.0).any(axis=1) & (weight != 0.0))
         shadow_rays += len(traced)
-        blocked, closeness = _hidden(prims, surface, traced, np.array(light.position), tile_bytes)
+        blocked, closeness = _hidden(prims, surface, traced, position[traced], tile_bytes)
         counts = np.abs(shine * power.max(axis=1, initial=0.0) * weight)[traced] > NO_CONSEQUENCE
         margin[traced] = np.where(counts, np.minimum(margin[traced], closeness), margin[traced])
         visible = traced[~blocked]
@@ -137,21 +138,21 @@ def local_color(
 def _hidden(
     prims: Primitives, surface: Surface, rows: IndexArray, position: FloatArray, tile_bytes: int
 ) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Whether the light at `position` is hidden from the hits `rows`, (k,), and the margin (k,).
+    """Whether the light at `position` (k, 3) is hidden from the hits `rows`, (k,), and the margin (k,).
 
     Segments run from the lifted hits to the light. The far end is exact: the direction adds no error but its own rounding.
     """
     origin = surface.point[rows] + surface.lift[rows]
     hidden, margin = np.zeros(len(rows), np.bool_), np.zeros(len(rows))
     apart = np.flatnonzero((origin != position).any(axis=1))
-    rows, origin = rows[apart], origin[apart]
+    rows, origin, position = rows[apart], origin[apart], position[apart]
     segments = Rays(origin, position - origin, surface.prim[rows], surface.lift_err[rows], np.ones(len(rows)))
     by_others, others = occluded(prims, segments, tile_bytes)
     by_face, face = np.zeros(len(rows), np.bool_), np.full(len(rows), np.inf)
     at, tri = np.flatnonzero(surface.curved[rows]), surface.prim[rows[surface.curved[rows]]]
     curved = rows[at]
     by_face[at], face[at] = face_between(
-        prims.vertices[tri], surface.n_geo[curved], surface.point[curved], surface.lift[curved], position, surface.lift_err[curved]
+        prims.vertices[tri], surface.n_geo[curved], surface.point[curved], surface.lift[curved], position[at], surface.lift_err[curved]
     )
     hidden[apart] = by_others | by_face
     # The firmer of two that block decides; where neither does, the one that is nearer to it.
@@ -161,9 +162,13 @@ def _hidden(
 
 
 def _light_term(
-    materials: MaterialTable, surface: Surface, position: FloatArray, scale: FloatArray
+    materials: MaterialTable, surface: Surface, light: Light, position: FloatArray, scale: FloatArray
 ) -> tuple[FloatArray, NDArray[np.bool_], FloatArray]:
-    """Kd max(N.L, 0) + Ks max(R.V, 0)^exponent (m,); whether the light is on the viewer's side (m,); closeness to the other side (m,)."""
+    """What the surface makes of a light at `position` (m, 3), as far as its cone lets it through.
+
+    Returns Kd max(N.L, 0) + Ks max(R.V, 0)^exponent, times the cone's part (m,); whether the light is on the viewer's side (m,);
+    closeness to the other side, or to a hard edge of the cone (m,).
+    """
     ids = surface.material
     to_light = position - surface.point
     distance = np.linalg.norm(to_light, axis=1)
@@ -174,12 +179,16 @@ def _light_term(
     shine = materials.diffuse[ids] * np.maximum(n_l, 0.0) + gloss
     above = (g_l > 0.0) | surface.curved
     lit = (n_l > 0.0) & above
+    passed, gap = cone(light, unit)
     # At N.L = 0 only the specular term jumps; at n_geo.L = 0, unless curved, also the diffuse one, as far as the two normals differ.
     at_geo = gloss + materials.diffuse[ids] * np.maximum(n_l - g_l, 0.0)
     moved = np.divide(surface.pos_err, distance, where=distance > 0.0, out=np.full_like(distance, np.inf))
     by_shade, by_geo = np.abs(n_l) / (1.0 + moved + surface.curvature * surface.pos_err), np.abs(g_l) / (1.0 + moved)
+    by_cone = np.where(lit & (np.abs(shine) * scale > NO_CONSEQUENCE), gap / (1.0 + moved), np.inf)
+    scale = scale * passed
     jump_shade = np.abs(gloss) * scale > NO_CONSEQUENCE
     jump_geo = (np.abs(at_geo) * scale > NO_CONSEQUENCE) & ~surface.curved
     leave = np.minimum(np.where(jump_shade, by_shade, np.inf), np.where(jump_geo, by_geo, np.inf))
     enter = np.maximum(np.where(n_l > 0.0, 0.0, by_shade), np.where(above, 0.0, by_geo))
-    return shine, lit, np.where(lit, leave, np.where(np.where(surface.curved, jump_shade, jump_geo), enter, np.inf))
+    sides = np.where(lit, leave, np.where(np.where(surface.curved, jump_shade, jump_geo), enter, np.inf))
+    return shine * passed, lit, np.minimum(sides, by_cone)

@@ -15,6 +15,7 @@ from clrt.reference import media
 from clrt.reference.bounce import STACK_SIZE, MediumStack, Walls, bounces
 from clrt.reference.crossings import BAND, Rays
 from clrt.reference.geometry import MaterialTable, Primitives
+from clrt.reference.lights import lights_of
 from clrt.reference.lines import TILE_BYTES
 from clrt.reference.shade import Surface, local_color, surfaces
 from clrt.reference.texture import tints
@@ -147,7 +148,7 @@ def _trace(world: _World, wave: _Wave, picture: ReferencePicture, depth: int) ->
     wave, prim, t = _select(wave, hit), prim[hit], t[hit]
     surface = surfaces(world.prims, wave.rays, prim, t)
     color, margin, shadow_rays = local_color(
-        world.prims, world.materials, world.scene.lights, surface, wave.weight, world.tile_bytes
+        world.prims, world.materials, lights_of(world.scene), surface, wave.weight, world.tile_bytes
     )
     picture.rays["shadow"] += shadow_rays
     tint, sharpness = tints(world.scene, world.prims, surface)

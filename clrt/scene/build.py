@@ -20,7 +20,7 @@ from clrt.scene.picture import Folders
 from clrt.scene.text import Declarations, read_declarations, read_file
 from clrt.scene.textures import read_textures
 from clrt.scene.triangles import flip_x
-from clrt.scene.words import WORDS, Draft
+from clrt.scene.words import SPOT_DIRECTION, SUN_DIRECTION, WORDS, Draft
 
 _ANYTHING = re.compile(r"[^\s\ufeff]")
 
@@ -56,6 +56,7 @@ def parse_scene(
     _check_primitives(found, faults)
     _check_materials(found, faults)
     _check_words(found, faults)
+    _check_lamps(found, faults)
     textured = read_textures(found, folders or Folders(Path()), faults)
     camera = build_camera(found, right_handed, faults)
     faults.raise_if_any()
@@ -68,11 +69,11 @@ def parse_scene(
         WORDS[call.name].apply(draft, call)
     _check_absorption(objects, draft.materials, found, faults)
     faults.raise_if_any()
-    if not draft.lights:
+    if not (draft.lights or draft.spots or draft.suns):
         warnings.append("there is no light (L); only the ambient part of the materials is seen")
     scene = Scene(
         camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,
-        source, tuple(warnings), textures=textured.textures,
+        source, tuple(warnings), textures=textured.textures, spots=tuple(draft.spots), suns=tuple(draft.suns),
     )  # fmt: skip
     scene = replace(scene, samples=draft.samples, samples_line=draft.samples_line)
     return _mirrored(scene) if right_handed else scene
@@ -129,6 +130,14 @@ def _check_glass_words(found: Declarations, faults: Faults) -> None:
         faults.add(call.line, call.column, fault)
 
 
+def _check_lamps(found: Declarations, faults: Faults) -> None:
+    """A sun and a spot have a direction."""
+    for call in found.words:
+        what = {"sun": SUN_DIRECTION, "spot": SPOT_DIRECTION}.get(call.name)
+        if what and not any(call.number(f"{axis} of {what}") for axis in "xyz"):
+            faults.add(call.line, call.columns[f"x of {what}"], f"{what} is zero; give it a length, as in \"{WORDS[call.name].example}\"")
+
+
 def _check_absorption(objects: tuple[MeshObject, ...], materials: list[Material], found: Declarations, faults: Faults) -> None:
     """A medium fills its object whole: all glass of an object absorbs alike."""
     for item in objects:
@@ -168,8 +177,14 @@ def _spheres(found: Declarations) -> Spheres:
 def _mirrored(scene: Scene) -> Scene:
     """The same scene with x turned round, but for the camera, which is built from turned lines."""
     spheres = replace(scene.spheres, centers=flip_x(scene.spheres.centers))
-    lights = tuple(replace(light, position=(0.0 - light.position[0], *light.position[1:])) for light in scene.lights)
-    return replace(scene, lights=lights, objects=tuple(map(_mirrored_object, scene.objects)), spheres=spheres)
+    lights = tuple(replace(light, position=_turned(light.position)) for light in scene.lights)
+    spots = tuple(replace(spot, position=_turned(spot.position), direction=_turned(spot.direction)) for spot in scene.spots)
+    suns = tuple(replace(sun, direction=_turned(sun.direction)) for sun in scene.suns)
+    return replace(scene, lights=lights, spots=spots, suns=suns, objects=tuple(map(_mirrored_object, scene.objects)), spheres=spheres)
+
+
+def _turned(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+    return 0.0 - vector[0], vector[1], vector[2]
 
 
 def _mirrored_object(mesh: MeshObject) -> MeshObject:

@@ -46,7 +46,8 @@ class Field:
         return f"{kind}{low} and {high}"
 
 
-def _point(what: str) -> tuple[Field, ...]:
+def point_fields(what: str) -> tuple[Field, ...]:
+    """x, y and z of a point or a vector."""
     return tuple(Field(f"{axis} of {what}") for axis in "xyz")
 
 
@@ -55,7 +56,7 @@ def color_fields() -> tuple[Field, ...]:
     return tuple(Field(channel, low=0.0) for channel in ("red", "green", "blue"))
 
 
-_VERTICES = _point("vertex 1") + _point("vertex 2") + _point("vertex 3")
+_VERTICES = point_fields("vertex 1") + point_fields("vertex 2") + point_fields("vertex 3")
 _SIDES = tuple(Field(name, low=1.0, high=float(LARGEST_SIDE), whole=True) for name in ("width", "height"))
 _MATERIAL = (
     *color_fields(), Field("Ka", low=0.0), Field("Kd", low=0.0), Field("Ks", low=0.0),
@@ -64,19 +65,19 @@ _MATERIAL = (
 
 #: letter -> number of fields -> the fields
 LETTERS: dict[str, dict[int, tuple[Field, ...]]] = {
-    "E": {3: _point("the eye")},
-    "V": {3: _point("the view direction"), 6: _point("the view direction") + _point("the up vector")},
+    "E": {3: point_fields("the eye")},
+    "V": {3: point_fields("the view direction"), 6: point_fields("the view direction") + point_fields("the up vector")},
     "F": {1: (Field("field of view in degrees", low=0.0, high=180.0, low_open=True, high_open=True),)},
     "R": {2: _SIDES},
-    "O": {0: (), 12: tuple(f for name in ("UL", "UR", "LL", "LR") for f in _point(f"image corner {name}"))},
-    "S": {4: (*_point("the centre"), Field("radius", low=0.0, low_open=True))},
+    "O": {0: (), 12: tuple(f for name in ("UL", "UR", "LL", "LR") for f in point_fields(f"image corner {name}"))},
+    "S": {4: (*point_fields("the centre"), Field("radius", low=0.0, low_open=True))},
     "T": {
         9: _VERTICES,
-        12: _VERTICES + _point("the face normal"),
-        18: _VERTICES + _point("normal 1") + _point("normal 2") + _point("normal 3"),
+        12: _VERTICES + point_fields("the face normal"),
+        18: _VERTICES + point_fields("normal 1") + point_fields("normal 2") + point_fields("normal 3"),
     },
     "M": {8: _MATERIAL, 10: (*_MATERIAL, Field("Refract", low=0.0, high=1.0), Field("Nr", low=0.0))},
-    "L": {3: _point("the light"), 6: _point("the light") + color_fields()},
+    "L": {3: point_fields("the light"), 6: point_fields("the light") + color_fields()},
 }
 
 

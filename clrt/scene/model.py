@@ -131,6 +131,31 @@ class PointLight:
     line: int = 0
 
 
+@dataclass(frozen=True)
+class SpotLight:
+    """A point light with a cone, as of a lamp: full inside, less towards the edge, nothing outside.
+
+    direction : unit, from the light into the cone, along its axis
+    outer, inner : half-angles of the cone and of its bright part, radians, 0 <= inner <= outer; equal: a hard edge
+    """
+
+    position: tuple[float, float, float]
+    direction: tuple[float, float, float]
+    outer: float
+    inner: float
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class SunLight:
+    """A light infinitely far away. direction : unit, towards the light."""
+
+    direction: tuple[float, float, float]
+    color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    line: int = 0
+
+
 @dataclass(frozen=True, eq=False)
 class MeshObject:
     """Triangles that share one kd-tree.
@@ -198,10 +223,17 @@ class Scene:
     samples: int = 1
     samples_line: int = 0
     seed: int = 0
+    spots: tuple[SpotLight, ...] = ()
+    suns: tuple[SunLight, ...] = ()
 
     @property
     def triangle_count(self) -> int:
         return sum(len(o) for o in self.objects)
+
+    @property
+    def lights_with_position(self) -> tuple[PointLight | SpotLight, ...]:
+        """The lights whose rays share a point: point lights, then spots."""
+        return (*self.lights, *self.spots)
 
     def with_size(self, width: int, height: int) -> Scene:
         """The same scene seen at another resolution (see Camera.with_size)."""

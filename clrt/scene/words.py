@@ -5,13 +5,14 @@ To add a word, write its grammar and what it does to the draft of the scene, and
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from clrt.scene.faults import Faults, did_you_mean, shown
-from clrt.scene.grammar import Field, color_fields
-from clrt.scene.model import Material, PointLight
+from clrt.scene.grammar import Field, color_fields, point_fields
+from clrt.scene.model import Material, PointLight, SpotLight, SunLight
 from clrt.scene.tokens import Token, read_in_range
 
 MOST_SAMPLES = 1 << 16  #: of a pixel
@@ -65,6 +66,8 @@ class Draft:
 
     materials: list[Material] = field(default_factory=list)
     lights: list[PointLight] = field(default_factory=list)
+    spots: list[SpotLight] = field(default_factory=list)
+    suns: list[SunLight] = field(default_factory=list)
     background: tuple[float, float, float] = (0.0, 0.0, 0.0)
     depth: int = 5
     samples: int = 1
@@ -101,12 +104,42 @@ _PROJECT_KEYS: tuple[tuple[Field | Text | Choice, Value], ...] = (
     (Choice("axis", ("x", "y", "z")), "y"),
     (Field("scale", low=0.0, low_open=True), 1.0),
 )
+SUN_DIRECTION, SPOT_DIRECTION = "the direction to the sun", "the spot's direction"
+_LAMP_COLOR = (*((channel, 1.0) for channel in color_fields()), (Field("intensity", low=0.0, high=1e6), 1.0))
+_SPOT = (
+    *point_fields("the spot"), *point_fields(SPOT_DIRECTION),
+    Field("cone angle in degrees", low=0.0, high=180.0, low_open=True),
+)  # fmt: skip
 _SAMPLES = Field("samples", low=1.0, high=float(MOST_SAMPLES), whole=True)
 _DEPTH = Field("depth", low=0.0, high=float(GREATEST_DEPTH), whole=True)
 
 
 def _set_background(draft: Draft, call: WordCall) -> None:
     draft.background = (call.number("red"), call.number("green"), call.number("blue"))
+
+
+def _lamp_color(call: WordCall) -> tuple[float, float, float]:
+    red, green, blue = (call.number("intensity") * call.number(channel) for channel in ("red", "green", "blue"))
+    return red, green, blue
+
+
+def _unit(call: WordCall, what: str) -> tuple[float, float, float]:
+    """The vector of the fields x, y, z of `what`, which is not zero, at length 1. Scaled first, lest its square over- or underflow."""
+    vector = [call.number(f"{axis} of {what}") for axis in "xyz"]
+    scaled = [value / max(map(abs, vector)) for value in vector]
+    x, y, z = (value / math.hypot(*scaled) for value in scaled)
+    return x, y, z
+
+
+def _add_sun(draft: Draft, call: WordCall) -> None:
+    draft.suns.append(SunLight(_unit(call, SUN_DIRECTION), _lamp_color(call), call.line))
+
+
+def _add_spot(draft: Draft, call: WordCall) -> None:
+    x, y, z = (call.number(f"{axis} of the spot") for axis in "xyz")
+    outer = math.radians(call.number("cone angle in degrees")) / 2.0
+    inner = outer * (1.0 - call.number("softness"))
+    draft.spots.append(SpotLight((x, y, z), _unit(call, SPOT_DIRECTION), outer, inner, _lamp_color(call), call.line))
 
 
 def _set_samples(draft: Draft, call: WordCall) -> None:
@@ -143,6 +176,10 @@ WORDS: dict[str, Word] = {
     "background": Word(_BACKGROUND, "background 0.2 0.3 0.5", _set_background),
     "depth": Word((_DEPTH,), "depth 5", _set_depth),
     "samples": Word((_SAMPLES,), "samples 64", _set_samples),
+    "spot": Word(
+        _SPOT, "spot 0 5 0 0 -1 0 40 softness=0.2", _add_spot, ((Field("softness", low=0.0, high=1.0), 0.0), *_LAMP_COLOR), once=False
+    ),
+    "sun": Word(point_fields(SUN_DIRECTION), "sun 1 2 -1 intensity=0.8", _add_sun, _LAMP_COLOR, once=False),
     "texture": Word((Text("picture"),), "texture wood.png wrap=mirror", _no_change, _TEXTURE_KEYS, once=False),
     "uv": Word(_UV, "uv 0 0 1 0 1 1", _no_change, once=False),
     "project": Word((), "project axis=y scale=2", _no_change, _PROJECT_KEYS, once=False),
