@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
-    "ClrtError", "DeviceError", "Image", "LimitError", "MeshError", "ObjectStats", "RayCaster", "RayError", "RunStats", "Scene", "SceneError",
+    "ClrtError", "DeviceError", "Image", "LimitError", "MeshError", "ObjectStats", "RayCaster", "RayError",
+    "RunStats", "Scene", "SceneError",
     "devices", "load", "render",
 ]  # fmt: skip
 

@@ -13,7 +13,7 @@ import numpy as np
 from clrt.device import program
 from clrt.device.context import Device, open_device
 from clrt.device.pack import local_origin, pack
-from clrt.device.session import Buffers, Tracer
+from clrt.device.session import Buffers, Tracer, check_picture
 from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
 from clrt.files import atomic_write
@@ -22,6 +22,7 @@ from clrt.kdtree import build_tree
 from clrt.kdtree.tree import KdTree
 from clrt.precision import DEFAULT, Precision, rung
 from clrt.scene.model import Scene
+from clrt.scene.scale import at_working_size
 from clrt.scene.words import MOST_SAMPLES
 from clrt.stats import ObjectStats, RunStats
 
@@ -64,8 +65,9 @@ def render(
     """
     start = time.perf_counter()
     tell = progress or (lambda phase, fraction: None)
-    scene = _with_sampling(_with_options(scene, size, depth), samples, seed)
+    scene = at_working_size(_with_sampling(_with_options(scene, size, depth), samples, seed))
     ladder, opened = rung(precision), open_device(device)
+    check_picture(opened, scene.camera.width, scene.camera.height)
     features = Features.of(scene)
     prepared = build_trees(scene, tree, tell)
     build_end = time.perf_counter()

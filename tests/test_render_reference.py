@@ -15,6 +15,7 @@ import pytest
 import clrt.reference
 from clrt import renderer
 from clrt.device.context import Device
+from clrt.errors import LimitError
 from clrt.features import Features
 from clrt.generate import rabbit_like
 from clrt.precision import RUNGS, rung
@@ -125,6 +126,24 @@ def test_counts_of_rays_and_tests() -> None:
     two = clrt.render(parse_scene(text + "T -50 -50 -30 50 -50 -30 0 90 -30\n"), count=True).stats
     assert two is not None
     assert two.ray_counts == {"primary": 64 * 64, "shadow": 64 * 64}
+
+
+def test_counts_go_beyond_32_bits() -> None:
+    """9,000 equal triangles that fill the view, behind each other's place: each primary ray tests all of them."""
+    text = CAMERA.replace("64 64", "1024 512") + PLAIN + "T -50 -50 3 50 -50 3 0 90 3\n" * 9000
+    stats = renderer.render(replace(parse_scene(text), lights=()), count=True).stats
+    assert stats is not None
+    assert stats.ray_counts == {"primary": 1024 * 512}
+    assert stats.tests_per_ray == 9000.0
+
+
+def test_picture_beyond_the_device_is_refused_before_the_work(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    side = int((device.handle.max_mem_alloc_size // 12) ** 0.5) + 2
+    if side * side > renderer.MAX_PIXELS:
+        pytest.skip("this device has room for the largest picture there is")
+    monkeypatch.setattr(renderer, "build_trees", lambda *_: pytest.fail("work was begun"))
+    with pytest.raises(LimitError, match="has room for"):
+        renderer.render(parse_scene(SCENES["smooth"]), size=(side, side))
 
 
 def test_depth_zero_leaves_the_mirror_out(tmp_path: Path) -> None:

@@ -200,14 +200,15 @@ def _frame(
 
 
 def _lights(packed: Packed) -> NDArray[np.void]:
-    """Point lights, then spots; where there are spots, each with its cone (spot.cl), that of a point light being all around it."""
+    """Point lights, then spots; where the program knows of spots, each with its cone (spot.cl), a point light's all around it."""
     scene = packed.scene
     records = np.zeros(len(scene.lights_with_position), light_dtype(packed.features, packed.real))
     for i, light in enumerate(scene.lights_with_position):
         records["given"][i], records["color"][i] = light.position, light.color
         records["position"][i] = np.asarray(light.position) - packed.origin
-    if scene.spots:
+    if "edge" in (records.dtype.names or ()):
         records["edge"], records["slope"] = 3.0, STEEPEST_EDGE
+    if scene.spots:
         cones = records[len(scene.lights) :]
         outer, inner = np.array([(spot.outer, spot.inner) for spot in scene.spots]).T
         # 1 - cos; and cos b - cos a as a product, which keeps the digits of narrow rims.
@@ -252,12 +253,6 @@ def _media(packed: Packed) -> NDArray[np.int32]:
     return np.concatenate([[meshes, len(around)], pairs.ravel(), rank]).astype(np.int32)
 
 
-def _corner_uvs(packed: Packed) -> FloatArray:
-    """(s, 3, 2) float64, the texture coordinates of the corners; zero where a triangle has none."""
-    given = [np.zeros((len(o), 3, 2)) if o.uvs is None else o.uvs for o in packed.scene.objects]
-    return np.concatenate([np.zeros((0, 3, 2)), *(uvs[order] for uvs, order in zip(given, packed.orders, strict=True))])
-
-
 def _sample_range(packed: Packed) -> NDArray[np.int32]:
     """Number of the next sample, and how many are in the sums: see sampling.cl."""
     return np.zeros(2, np.int32)
@@ -267,6 +262,12 @@ def _sample_sums(packed: Packed) -> NDArray[np.float64]:
     """(h, w, 3) of the samples so far."""
     camera = packed.scene.camera
     return np.zeros((camera.height, camera.width, 3))
+
+
+def _corner_uvs(packed: Packed) -> FloatArray:
+    """(s, 3, 2) float64, the texture coordinates of the corners; zero where a triangle has none."""
+    given = [np.zeros((len(o), 3, 2)) if o.uvs is None else o.uvs for o in packed.scene.objects]
+    return np.concatenate([np.zeros((0, 3, 2)), *(uvs[order] for uvs, order in zip(given, packed.orders, strict=True))])
 
 
 def _absorption(packed: Packed) -> NDArray[Any]:

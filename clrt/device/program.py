@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from clrt.device import layout
+from clrt.device import kernel_cache, layout
 from clrt.device.context import Device
 from clrt.errors import DeviceError, LimitError
 from clrt.features import REAL, Features
@@ -34,7 +34,7 @@ _TREES = ("box.cl", "kdtree.cl")
 #: entry point -> files before effects that the traversal calls, between those and other effects, after all
 _ENTRIES = {
     "render": (("hit.cl",), ("scene.cl", "surface.cl"), ("camera.cl", "prepare.cl", "render.cl")),
-    "cast": ((), ("scene.cl",), ("prepare.cl", "cast.cl")),
+    "cast": ((), ("scene.cl",), ("prepare.cl", "cast.cl", "cast_finish.cl")),
 }
 PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a packet, width and height
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
@@ -46,6 +46,7 @@ _DEFAULTS = {"trace": "        scene_trace(&geometry, &rays, 1, 0, &hits);", "ne
              "store": "        for (int a = 0; a < 3; a++) film[3 * ((size_t)y * frame->width + x) + a] = (float)out[a][k];"}  # fmt: skip
 _PLACE = re.compile(r"^[ \t]*//@ (\w+)[ \t]*$", re.M)
 _HOOK = re.compile(r"^//@hook (\w+)\n(.*?)^//@end[ \t]*\n?", re.M | re.S)
+_KERNEL = re.compile(r"^kernel\b[^{;]*?\bvoid (\w+)\(", re.M)
 _COUNTING = re.compile(r"^([ \t]*)//@counting (.*)\n", re.M)
 
 
@@ -214,8 +215,8 @@ def check_options(options: tuple[str, ...]) -> None:
 def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> Any:
     """Compiles `source` on `device`; a pyopencl Program.
 
-    PoCL keeps its own cache of compiled kernels; a process that was killed can leave a broken entry there, so a build that
-    fails is tried once more from a text the cache does not know. Raises DeviceError with the compiler's message.
+    A broken entry of PoCL's cache can fail here; so a build that fails empties the cache and is tried once more, from a text that no
+    cache knows. Raises DeviceError with the compiler's message.
     """
     import pyopencl as cl
 
@@ -223,9 +224,13 @@ def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> An
     error: Exception | None = None
     for text in (source, source + "\n// built again, past the cache\n"):
         try:
-            with warnings.catch_warnings():
+            with warnings.catch_warnings(), kernel_cache.loading():
                 warnings.simplefilter("ignore", cl.CompilerWarning)
-                return cl.Program(device.context, text).build(options=list(options))
+                built = cl.Program(device.context, text).build(options=list(options))
+                for name in _KERNEL.findall(text):  # what a broken entry lacks is missed only when it is asked for
+                    cl.Kernel(built, name)
+                return built
         except cl.Error as failure:
             error = failure
+            kernel_cache.clear()
     raise DeviceError(f"the device '{device.info.name}' could not compile the program: {error}") from error

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device import layout, program
+from clrt.device import kernel_cache, layout, program
 from clrt.device.context import Device
 from clrt.device.pack import Packed
 from clrt.errors import LimitError
@@ -15,6 +15,24 @@ from clrt.features import Features
 from clrt.precision import Precision
 
 _PREPARE_LOCAL = 64
+FILM_BYTES = 12  #: a pixel of the film: three float32
+
+
+def check_buffer(device: Device, size: int, what: str) -> None:
+    """Raises LimitError where `size` bytes are more than the device gives in one piece."""
+    limit = device.handle.max_mem_alloc_size
+    if size > limit:
+        raise LimitError(f"{what} needs {size >> 20:,} MiB in one piece; the device '{device.info.name}' gives {limit >> 20:,} MiB at most")
+
+
+def check_picture(device: Device, width: int, height: int) -> None:
+    """Raises LimitError where the device has no room for a picture of this size: said before any work."""
+    pixels = device.handle.max_mem_alloc_size // FILM_BYTES
+    if width * height > pixels:
+        raise LimitError(
+            f"a picture of {width} x {height} needs {width * height * FILM_BYTES >> 20:,} MiB in one piece; "
+            f"the device '{device.info.name}' has room for {pixels:,} pixels"
+        )
 
 
 class Buffers:
@@ -49,11 +67,13 @@ class Buffers:
 
         flags = (cl.mem_flags.READ_WRITE if writable else cl.mem_flags.READ_ONLY) | cl.mem_flags.COPY_HOST_PTR
         contents = np.ascontiguousarray(array) if array.size else np.zeros(1, array.dtype)
+        check_buffer(self.device, contents.nbytes, "the scene")
         return cl.Buffer(self.device.context, flags, hostbuf=contents)
 
     def empty(self, size: int) -> Any:
         import pyopencl as cl
 
+        check_buffer(self.device, size, "the scene")
         return cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, size)
 
     def prepare(self, built: Any, *, planes: bool = True) -> None:
@@ -65,10 +85,11 @@ class Buffers:
             return
         size = (-(-packed.slots // _PREPARE_LOCAL) * _PREPARE_LOCAL,)
         origin = _double4(packed.origin)
-        cl.Kernel(built, "prepare_triangles")(queue, size, (_PREPARE_LOCAL,), self.vertices, origin, self.triangles, count)
-        if planes:
-            self._prepare_planes(cl.Kernel(built, "prepare_planes"), size, count)
-        queue.finish()
+        with kernel_cache.loading():
+            cl.Kernel(built, "prepare_triangles")(queue, size, (_PREPARE_LOCAL,), self.vertices, origin, self.triangles, count)
+            if planes:
+                self._prepare_planes(cl.Kernel(built, "prepare_planes"), size, count)
+            queue.finish()
 
     def _prepare_planes(self, kernel: Any, size: tuple[int], count: np.int32) -> None:
         packed, queue, local = self.packed, self.device.queue, (_PREPARE_LOCAL,)
@@ -110,9 +131,9 @@ class Tracer:
         self.buffers, self.counting = buffers, counting
         self.width, self.height = scene.camera.width, scene.camera.height
         self.lanes = buffers.precision.lanes(buffers.device.info.lanes)
-        self.film = buffers.empty(self.width * self.height * 12)
+        self.film = buffers.empty(self.width * self.height * FILM_BYTES)
         self.kernel = cl.Kernel(built, "render")
-        self.counters = np.zeros(len(buffers.features.ray_kinds) + len(scene.objects), np.uint32)
+        self.counters = np.zeros(len(buffers.features.ray_kinds) + len(scene.objects), np.uint64)
         self.counts = np.zeros(len(self.counters), np.int64)
         self._counter_buffer: Any = buffers.empty(self.counters.nbytes) if counting else None
         nodes, indices, objects, surfaces, materials = buffers.core
@@ -142,7 +163,8 @@ class Tracer:
 
     def warm_up(self) -> None:
         """Launches over no rows: PoCL compiles for a local size at its first launch, which belongs to compiling."""
-        self.run(0, 0)
+        with kernel_cache.loading():
+            self.run(0, 0)
 
     def run(self, first_row: int, end_row: int) -> None:
         """Renders rows [first_row, end_row) and waits for them. In the counting build, adds to `counts`."""
@@ -159,7 +181,7 @@ class Tracer:
         queue.finish()
         if self.counting:
             cl.enqueue_copy(queue, self.counters, self._counter_buffer)
-            self.counts += self.counters
+            self.counts += self.counters.astype(np.int64)
 
     def picture(self) -> NDArray[np.float32]:
         """(height, width, 3) float32, linear."""

@@ -45,12 +45,13 @@ def _table(srgb: bool, code_bytes: int) -> NDArray[np.float64]:
 
 def values(textures: Sequence[Texture], real: type[np.floating]) -> NDArray[Any]:
     """The tables of all kinds of codes, one after the other."""
-    return np.concatenate([_table(*kind) for kind in _tables(textures)]).astype(real)
+    return np.concatenate([np.zeros(0), *(_table(*kind) for kind in _tables(textures))]).astype(real)
 
 
 def codes(textures: Sequence[Texture]) -> NDArray[np.uint8]:
     """The texels of all pictures as bytes, rows from the top; 16 bits in the machine's order, as devices of the same machine read them."""
-    return np.concatenate([np.ascontiguousarray(picture.texels).reshape(-1).view(np.uint8) for picture in _pictures(textures)])
+    rows = (np.ascontiguousarray(picture.texels).reshape(-1).view(np.uint8) for picture in _pictures(textures))
+    return np.concatenate([np.zeros(0, np.uint8), *rows])
 
 
 def records(textures: Sequence[Texture], real: type[np.floating]) -> NDArray[np.void]:
