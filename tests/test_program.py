@@ -94,8 +94,12 @@ def test_line_directives_are_true(device: Device) -> None:
         program.build(device, broken)
 
 
-@pytest.mark.parametrize("names", list(itertools.combinations([f.name for f in FEATURES if f.name != "bounce"], 2)))
-def test_pairs_of_effects_compile_for_any_width(device: Device, names: tuple[str, str]) -> None:
+NAMES = [f.name for f in FEATURES if f.name != "bounce"]
+PAIRS = [pytest.param(pair, marks=pytest.mark.slow) for pair in itertools.combinations(NAMES, 2)]
+
+
+@pytest.mark.parametrize("names", [*((name,) for name in NAMES), *PAIRS], ids=lambda names: "+".join(names))
+def test_effects_and_pairs_of_them_compile_for_any_width(device: Device, names: tuple[str, ...]) -> None:
     wanted = {*names}
     wanted |= {"refraction"} if {"fresnel", "absorption"} & wanted else set()
     wanted |= {"bounce"} if {"mirror", "refraction"} & wanted else set()
