@@ -58,9 +58,8 @@ def write_docs(results: dict[str, Any], root: Path) -> list[Path]:
         raise ClrtError("a quick run is not for the documentation; leave out --quick")
     check_docs(root)
     page, readme, numerics = _documents(root)
-    largest = max(row["size"] for row in results["trees"])
     main = [
-        trees_table([row for row in results["trees"] if row["size"] == largest]),
+        trees_table(results["trees"]),
         versus_table(results["versus"], results["machine"]["cores"]),
     ]
     chosen = ((page, tables(results)), (readme, main), (numerics, [ladder_table(results["ladder"])]))

@@ -38,7 +38,7 @@ class Plan:
     """
 
     rounds: int = 5
-    sizes: tuple[int, ...] = (256, 512)
+    sizes: tuple[int, ...] = (256, 512, 1024)
     sample: int = 256
     brute_limit: int = 10_000_000_000
     brute_count_size: int = 64
