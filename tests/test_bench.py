@@ -219,6 +219,7 @@ def test_lines_of_an_absent_effect_are_found_where_they_are(tmp_path: Path) -> N
     assert absent_bytes(compose(without, rung(DEFAULT), 4, Shape(16, 5)), lost, without.active) == 0
 
 
+@pytest.mark.slow
 def test_quick_run_measures_everything(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "clrt.bench", "--quick", "--out", str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)

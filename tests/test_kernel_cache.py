@@ -21,8 +21,11 @@ def _render(folder: Path) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("damaged", ["render.so", "program.bc"])
-@pytest.mark.parametrize("size", [0, 3000])
+@pytest.mark.parametrize(
+    ("damaged", "size"),
+    [("render.so", 3000), ("program.bc", 0), pytest.param("render.so", 0, marks=pytest.mark.slow),
+     pytest.param("program.bc", 3000, marks=pytest.mark.slow)],
+)  # fmt: skip
 def test_broken_entry_is_dropped_at_the_latest_by_the_next_run(tmp_path: Path, damaged: str, size: int) -> None:
     if list_devices()[0].platform != POCL:
         pytest.skip("the default device is not PoCL's")
