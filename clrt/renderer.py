@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from clrt.device import program
 from clrt.device.context import Device, open_device
 from clrt.device.pack import local_origin, pack
@@ -89,7 +87,7 @@ def render(
     if tracer.stages is not None:
         stats.decided = tracer.stages.read()
     if count:
-        _count(buffers, stats, tell)
+        _count(prepared, buffers, stats, tell)
         stats.count_s = time.perf_counter() - end
     return Image(pixels, stats)
 
@@ -188,19 +186,18 @@ def run_rows(tracer: Tracer, phase: str, tell: Progress) -> None:
 def _object_stats(prepared: Prepared) -> list[ObjectStats]:
     return [
         ObjectStats(
-            name=item.name, triangles=len(item), nodes=len(tree.split_axis), leaves=int(np.count_nonzero(tree.split_axis == 3)),
-            references=len(tree.indices), depth=tree.depth, build_s=seconds,
+            name=item.name, triangles=len(item), nodes=tree.node_count, leaves=tree.leaf_count,
+            references=tree.reference_count, depth=tree.depth, build_s=seconds,
         )
         for item, tree, seconds in zip(prepared.scene.objects, prepared.trees, prepared.tree_s, strict=True)
     ]  # fmt: skip
 
 
-def _count(buffers: Buffers, stats: RunStats, tell: Progress) -> None:
+def _count(prepared: Prepared, buffers: Buffers, stats: RunStats, tell: Progress) -> None:
     """The same picture again by the counting build: rays by kind, tests by object."""
     precision, device = buffers.precision, buffers.device
     lanes = precision.lanes(device.info.lanes)
-    bounces = any(f.name == "bounce" for f in buffers.features.active)
-    shape = program.Shape(program.stack_size(stats.depth), buffers.packed.scene.depth if bounces else 0, buffers.shared_lights)
+    shape = _shape(prepared, buffers.features, buffers.shared_lights)
     tracer = Tracer(
         buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True
     )

@@ -180,11 +180,12 @@ def compose(features: Features, precision: Precision, lanes: int, shape: Shape, 
 
 
 def private_bytes(precision: Precision, lanes: int, shape: Shape, features: Features) -> int:
-    """An upper estimate of the private memory of one work-item, in bytes: its stacks, twice over for inlined copies, and 16 KiB."""
+    """An upper estimate of the private memory of one work-item, in bytes: its stacks, one a copy of the traversal, and 16 KiB."""
     lane_bytes = lanes * precision.bits // 8
     names = {f.name for f in features.active}
     entry = lane_bytes * (9 + (2 * MEDIA_DEPTH + 1 if "refraction" in names else 0) + (3 if "absorption" in names else 0)) + 64
-    traversal = shape.stack * (2 * lane_bytes + 4) * 3
+    copies = 1 + sum(name in names for name in ("bounce", "shadows", "sun shadows", "refraction"))  # refraction: for coincident walls
+    traversal = shape.stack * (2 * lane_bytes + 4) * copies
     return traversal + (entry * (shape.depth + 4) if "bounce" in names else 0) + (16 << 10)
 
 
