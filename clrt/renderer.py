@@ -21,7 +21,7 @@ from clrt.kdtree.tree import KdTree
 from clrt.precision import DEFAULT, Precision, rung
 from clrt.scene.model import Scene
 from clrt.scene.scale import at_working_size
-from clrt.scene.words import MOST_SAMPLES
+from clrt.scene.words.frame import MOST_SAMPLES
 from clrt.stats import ObjectStats, RunStats
 
 Progress = Callable[[str, float], None]

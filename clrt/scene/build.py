@@ -20,7 +20,7 @@ from clrt.scene.picture import Folders
 from clrt.scene.text import Declarations, read_declarations, read_file
 from clrt.scene.textures import read_textures
 from clrt.scene.triangles import flip_x
-from clrt.scene.words import SPOT_DIRECTION, SUN_DIRECTION, WORDS, Draft
+from clrt.scene.words import WORDS, Draft
 
 _ANYTHING = re.compile(r"[^\s\ufeff]")
 
@@ -56,7 +56,6 @@ def parse_scene(
     _check_primitives(found, faults)
     _check_materials(found, faults)
     _check_words(found, faults)
-    _check_lamps(found, faults)
     textured = read_textures(found, folders or Folders(Path()), faults)
     camera = build_camera(found, right_handed, faults)
     faults.raise_if_any()
@@ -101,41 +100,38 @@ def _check_materials(found: Declarations, faults: Faults) -> None:
 
 def _check_words(found: Declarations, faults: Faults) -> None:
     first: dict[str, int] = {}
-    _check_glass_words(found, faults)
+    _check_material_words(found, faults)
     for call in found.words:
-        if WORDS[call.name].of_glass:
+        word = WORDS[call.name]
+        if word.check:
+            word.check(call, faults)
+        if word.of:
             continue
-        if call.name in first and WORDS[call.name].once:
+        if call.name in first and word.once:
             faults.add(call.line, call.column, f"a second {call.name} line; the first is line {first[call.name]}, remove one of the two")
         first.setdefault(call.name, call.line)
 
 
-def _check_glass_words(found: Declarations, faults: Faults) -> None:
-    """Words of glass stand below a material with Refract > 0, each once a material."""
+def _check_material_words(found: Declarations, faults: Faults) -> None:
+    """Words of a material stand below one, each once a material; those of glass below one with Refract > 0."""
     materials, glass = found.lines_of("M").tolist(), found.get("M", 10)
     refract = dict(zip(glass.lines.tolist(), glass.values[:, 8].tolist(), strict=True)) | dict.fromkeys(found.broken.get("M", []), 1.0)
     first: dict[tuple[str, int], int] = {}
-    for call in (c for c in found.words if WORDS[c.name].of_glass):
+    for call in (c for c in found.words if WORDS[c.name].of):
+        word = WORDS[call.name]
         above = bisect_left(materials, call.line)
         material = materials[above - 1] if above else 0
         if not above:
-            fault = f'{call.name} before any material; add a line of glass above it, such as "M 1 1 1 0 0 0.5 60 0 1 1.5"'
-        elif not refract.get(material, 0.0) > 0.0:
+            what, such = ("a line of glass", "M 1 1 1 0 0 0.5 60 0 1 1.5") if word.of == "glass" else ("one", "M 1 1 1 0.1 0.7 0.3 20 0")
+            fault = f'{call.name} before any material; add {what} above it, such as "{such}"'
+        elif word.of == "glass" and not refract.get(material, 0.0) > 0.0:
             fault = f"{call.name} needs a material that light passes through; give the M of line {material} 10 numbers, Refract above 0"
-        elif (call.name, material) in first:
+        elif word.once and (call.name, material) in first:
             fault = f"a second {call.name} of one material; the first is line {first[call.name, material]}, remove one of the two"
         else:
             first[call.name, material] = call.line
             continue
         faults.add(call.line, call.column, fault)
-
-
-def _check_lamps(found: Declarations, faults: Faults) -> None:
-    """A sun and a spot have a direction."""
-    for call in found.words:
-        what = {"sun": SUN_DIRECTION, "spot": SPOT_DIRECTION}.get(call.name)
-        if what and not any(call.number(f"{axis} of {what}") for axis in "xyz"):
-            faults.add(call.line, call.columns[f"x of {what}"], f"{what} is zero; give it a length, as in \"{WORDS[call.name].example}\"")
 
 
 def _check_absorption(objects: tuple[MeshObject, ...], materials: list[Material], found: Declarations, faults: Faults) -> None:

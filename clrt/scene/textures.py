@@ -17,7 +17,7 @@ from clrt.scene.model import FloatArray, Material, Picture, Texture
 from clrt.scene.objects import gather, material_of
 from clrt.scene.picture import Folders, PictureError, read_picture
 from clrt.scene.text import Declarations
-from clrt.scene.words import WordCall
+from clrt.scene.words.word import WordCall
 
 #: axis that is looked along -> the axes that u and v follow
 _PLANES = {"x": (2, 1), "y": (0, 2), "z": (0, 1)}
