@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from clrt.device import kernel_cache, layout, program
 from clrt.device.context import open_device
-from clrt.device.pack import Packed, local_origin, pack
+from clrt.device.pack import local_origin, pack
+from clrt.device.packed import Packed
 from clrt.device.session import Buffers, StageCounter
 from clrt.features import Features
 from clrt.kdtree import build_tree

@@ -1,7 +1,7 @@
 // Provides: Bounce: rays that go on from a hit, waiting on a stack; bounce_*.
-// Needs: rays.cl, hit.cl, structs.  Reads: BOUNCE_STACK (greatest depth + 2).
+// Needs: rays.cl, hit.cl, structs.  Reads: BOUNCE_STACK.
 //
-// Depth first: a packet puts at most two packets on the stack and takes one off, so the stack holds at most depth + 1 and one to spare.
+// Depth first: a packet comes off the stack and puts at most one on it for each of b branches, so depth * (b - 1) + 1 wait at most; one is to spare.
 typedef struct {
     real_n origin[3], direction[3], weight;
     mask_n skip, active;

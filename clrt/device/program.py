@@ -64,6 +64,11 @@ class Shape:
     shared_lights: bool = True
 
 
+def bounce_stack(features: Features, depth: int) -> int:
+    """Packets that may wait: each that is taken off puts on one for each branch, `depth` times in a row; and one to spare."""
+    return (max(2, sum(f.branches for f in features.active)) - 1) * depth + 2
+
+
 def stack_size(tree_depth: int) -> int:
     """Stack entries for trees of this depth: rounded up to a multiple of 8, so that few programs serve all scenes."""
     return max(8, -(-(tree_depth + 1) // 8) * 8)
@@ -120,7 +125,7 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     if "shadows" in names:
         values["SHADOW_SHARED_ORIGIN"] = int(shape.shared_lights)
     if "bounce" in names:
-        values["BOUNCE_STACK"] = shape.depth + 2
+        values["BOUNCE_STACK"] = bounce_stack(features, shape.depth)
     if "refraction" in names:
         values["MEDIA_DEPTH"] = MEDIA_DEPTH
     if counting:
@@ -186,7 +191,7 @@ def private_bytes(precision: Precision, lanes: int, shape: Shape, features: Feat
     entry = lane_bytes * (9 + (2 * MEDIA_DEPTH + 1 if "refraction" in names else 0) + (3 if "absorption" in names else 0)) + 64
     copies = 1 + sum(name in names for name in ("bounce", "shadows", "sun shadows", "refraction"))  # refraction: for coincident walls
     traversal = shape.stack * (2 * lane_bytes + 4) * copies
-    return traversal + (entry * (shape.depth + 4) if "bounce" in names else 0) + (16 << 10)
+    return traversal + (entry * (bounce_stack(features, shape.depth) + 2) if "bounce" in names else 0) + (16 << 10)
 
 
 def check_limits(precision: Precision, lanes: int, shape: Shape, features: Features) -> None:

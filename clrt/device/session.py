@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from clrt.device import kernel_cache, layout, program
 from clrt.device.context import Device
-from clrt.device.pack import Packed
+from clrt.device.effect_arrays import PACKERS
+from clrt.device.packed import Packed
 from clrt.errors import LimitError
 from clrt.features import Features
 from clrt.precision import Precision
@@ -48,7 +49,7 @@ class Buffers:
         self.vertices = self.upload(packed.vertices)
         self.core = [self.upload(a) for a in (packed.nodes, packed.indices, packed.objects, packed.surfaces, packed.materials)]
         self.effects = {
-            name: self.upload(packed.argument(name), writable=name == "sample_sums")
+            name: self.upload(PACKERS[name](packed), writable=name == "sample_sums")
             for f in features.active for name, _ in f.parameters if name != "light_planes"
         }
         self.triangles = self.empty(max(1, packed.slots) * layout.triangle(precision.real).itemsize)

@@ -1,0 +1,107 @@
+"""The arrays of effects' kernel arguments, each made by the function of its name in `PACKERS`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.device import layout, texels
+from clrt.device.packed import FloatArray, Packed
+from clrt.device.program import MEDIA_DEPTH, light_dtype
+from clrt.scene.media import around_eye, ranks, refracting_materials
+
+STEEPEST_EDGE = 1e30  #: slope of a spot's hard edge: any rounding error times it is past the whole step
+
+Packer = Callable[[Packed], NDArray[Any]]
+
+
+def _lights(packed: Packed) -> NDArray[np.void]:
+    """Point lights, then spots; where the program knows of spots, each with its cone (spot.cl), a point light's all around it."""
+    scene = packed.scene
+    records = np.zeros(len(scene.lights_with_position), light_dtype(packed.features, packed.real))
+    for i, light in enumerate(scene.lights_with_position):
+        records["given"][i], records["color"][i] = light.position, light.color
+        records["position"][i] = np.asarray(light.position) - packed.origin
+    if "edge" in (records.dtype.names or ()):
+        records["edge"], records["slope"] = 3.0, STEEPEST_EDGE
+    if scene.spots:
+        cones = records[len(scene.lights) :]
+        outer, inner = np.array([(spot.outer, spot.inner) for spot in scene.spots]).T
+        # 1 - cos; and cos b - cos a as a product, which keeps the digits of narrow rims.
+        rim = 2.0 * np.sin((outer + inner) / 2.0) * np.sin((outer - inner) / 2.0)
+        cones["axis"], cones["edge"] = [spot.direction for spot in scene.spots], 2.0 * np.sin(outer / 2.0) ** 2
+        cones["slope"] = 1.0 / np.maximum(rim, 1.0 / STEEPEST_EDGE)
+    return records
+
+
+def _suns(packed: Packed) -> NDArray[np.void]:
+    records = np.zeros(len(packed.scene.suns), layout.sun(packed.real))
+    for i, sun in enumerate(packed.scene.suns):
+        records["direction"][i], records["color"][i] = sun.direction, sun.color
+    return records
+
+
+def _spheres(packed: Packed) -> NDArray[np.void]:
+    spheres = packed.scene.spheres
+    records = np.zeros(len(spheres), layout.sphere(packed.real))
+    records["given"] = np.column_stack([spheres.centers - packed.origin, spheres.radii])
+    records["center"], records["radius"] = records["given"][:, :3], records["given"][:, 3]
+    records["material"] = spheres.material_ids
+    return records
+
+
+def _corner_normals(packed: Packed) -> NDArray[Any]:
+    """(s, 3, 3): the normals at the corners; an object without any has its face normals there."""
+    parts = []
+    for item, order in zip(packed.scene.objects, packed.orders, strict=True):
+        corners = item.vertex_normals if item.vertex_normals is not None else np.repeat(item.normals[:, None], 3, 1)
+        parts.append(corners[order].astype(packed.real))
+    return np.concatenate(parts)
+
+
+def _media(packed: Packed) -> NDArray[np.int32]:
+    """What refraction.cl asks of objects: see there. Of objects around the eye the highest ranks are kept."""
+    scene, rank, material = packed.scene, ranks(packed.scene), refracting_materials(packed.scene)
+    around = around_eye(scene)[-MEDIA_DEPTH:]
+    pairs = np.zeros((MEDIA_DEPTH, 2), np.int32)
+    pairs[: len(around)] = [(i, material[i]) for i in around] or np.zeros((0, 2))
+    meshes = np.count_nonzero(rank[: len(scene.objects)] >= 0)
+    return np.concatenate([[meshes, len(around)], pairs.ravel(), rank]).astype(np.int32)
+
+
+def _sample_range(packed: Packed) -> NDArray[np.int32]:
+    """Number of the next sample, and how many are in the sums: see sampling.cl."""
+    return np.zeros(2, np.int32)
+
+
+def _sample_sums(packed: Packed) -> NDArray[np.float64]:
+    """(h, w, 3) of the samples so far."""
+    camera = packed.scene.camera
+    return np.zeros((camera.height, camera.width, 3))
+
+
+def _corner_uvs(packed: Packed) -> FloatArray:
+    """(s, 3, 2) float64, the texture coordinates of the corners; zero where a triangle has none."""
+    given = [np.zeros((len(o), 3, 2)) if o.uvs is None else o.uvs for o in packed.scene.objects]
+    return np.concatenate([np.zeros((0, 3, 2)), *(uvs[order] for uvs, order in zip(given, packed.orders, strict=True))])
+
+
+def _absorption(packed: Packed) -> NDArray[Any]:
+    """(objects + spheres, 3): the coefficients of each one's medium, 0 where it lets no light through."""
+    materials = packed.scene.materials
+    rows = [materials[i].absorb if i >= 0 else (0.0, 0.0, 0.0) for i in refracting_materials(packed.scene).tolist()]
+    # No more than what a number holds: an infinite one would make a way of no length no number.
+    bounded = np.minimum(np.array(rows).reshape(-1, 3), np.finfo(packed.real).max)
+    return np.asarray(bounded, packed.real)
+
+
+PACKERS: dict[str, Packer] = {
+    "lights": _lights, "suns": _suns, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media, "absorption": _absorption,
+    "sample_range": _sample_range, "sample_sums": _sample_sums,
+    "textures": lambda packed: texels.records(packed.scene.textures, packed.real), "corner_uvs": _corner_uvs,
+    "texels": lambda packed: texels.codes(packed.scene.textures),
+    "texel_values": lambda packed: texels.values(packed.scene.textures, packed.real),
+}  # fmt: skip

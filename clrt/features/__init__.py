@@ -1,0 +1,68 @@
+"""What a scene calls for: effects, the line that calls each, and what each adds to the program.
+
+An effect is called for by a line of the scene, never by an option. One that is not called for is not in the composed
+program: not its kernel file, its arguments, its members of structs, nor its name.
+
+To add one: a `Feature` in a module here and its place in FEATURES, a file in kernels/ of its own, a packer for each kernel argument,
+a reference function, a smallest scene and a test. No other effect's file changes (CONTRIBUTING.md has the list).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from clrt.features import camera, helpers, lamps, shapes, surfaces
+from clrt.features.feature import REAL, Feature
+from clrt.scene.model import Scene
+
+__all__ = ["FEATURES", "HELPERS", "REAL", "Feature", "Features"]
+
+#: in the order of the program: code at the same place runs in this order
+FEATURES: tuple[Feature, ...] = (
+    helpers.SAMPLER,
+    helpers.SAMPLING,
+    camera.SAMPLES,
+    shapes.SPHERES,
+    shapes.SMOOTH,
+    lamps.SHADOWS,
+    lamps.DIRECT_LIGHT,
+    lamps.SPOT,
+    lamps.SUN_SHADOWS,
+    lamps.SUN,
+    surfaces.FRESNEL,
+    surfaces.REFRACTION,
+    surfaces.ABSORPTION,
+    surfaces.MIRROR,
+    helpers.GLOBE,
+    surfaces.TEXTURES,
+    helpers.BOUNCE,
+)
+HELPERS = frozenset(f.name for f in FEATURES if f.helper)  #: parts that effects share; not effects of their own
+
+
+@dataclass(frozen=True)
+class Features:
+    """The effects of one scene: `lines` maps each called-for feature to the line that calls for it (0: no text)."""
+
+    lines: tuple[tuple[str, int], ...]
+
+    @classmethod
+    def of(cls, scene: Scene) -> Features:
+        """What `scene` calls for."""
+        return cls(tuple((f.name, line) for f in FEATURES if (line := f.called_by(scene)) is not None))
+
+    @property
+    def active(self) -> tuple[Feature, ...]:
+        """The called-for features and their helpers, in the order of the program."""
+        names = {name for name, _ in self.lines}
+        return tuple(f for f in FEATURES if f.name in names)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of the effects, helpers left out."""
+        return tuple(f.name for f in self.active if f.name not in HELPERS)
+
+    @property
+    def ray_kinds(self) -> tuple[str, ...]:
+        """The kinds of rays that exist at all; the eye's first."""
+        return tuple(dict.fromkeys(("primary", *(kind for f in self.active for kind in f.rays))))
