@@ -34,6 +34,7 @@ HOT Bounce *bounce_push(const Geometry *geometry, const Rays *rays, BounceStack 
     next->active = active;
     next->depth_left = from->depth_left - 1;
     next->from_eye = 0;
+    //@ bounce_pushed
     return next;
 }
 

@@ -1,4 +1,4 @@
-// Provides: Hit: what shading needs to know of the nearest hit of each ray; gather, normalize_n, face_towards.
+// Provides: Hit: what shading needs to know of the nearest hit of each ray; Shade: what it adds up; gather, normalize_n, face_towards.
 // Needs: lanes.cl, rays.cl.  Reads: nothing.
 
 // Lane-wise reads: `expression` may use the lane number k.
@@ -19,6 +19,12 @@ typedef struct {
     lane_int material[LANES];
     //@ hit_members
 } Hit;
+
+// The light that leaves the hits towards the viewer by itself.
+typedef struct {
+    real_n sum[3];  // what the surface's colour multiplies
+    //@ shade_members
+} Shade;
 
 HOT void normalize_n(real_n *a) {
     const real_n scale = R(1.0) / sqrt(dot_n(a, a));

@@ -1,10 +1,10 @@
 // Provides: direct_light: point lights without fall-off and Phong's (1975) shading, two-sided.
 // Needs: hit.cl, structs.  Reads: nothing.
 
-// Adds weight * C * (Ka + sum of visible * Lrgb * (Kd N.L + Ks (R.V)^exponent)) to `color`. A light counts where it stands on the
+// Adds weight * C * (Ka + sum of visible * Lrgb * (Kd N.L + Ks (R.V)^exponent)) to `shade`. A light counts where it stands on the
 // viewer's side of both the shading and the true surface.
 HOT void direct_light(const Geometry *geometry, global const Light *lights, int light_count, global const Material *materials,
-                         const Rays *rays, const Hit *hit, real_n weight, real_n *sum) {
+                         const Rays *rays, const Hit *hit, real_n weight, Shade *shade) {
     real_n diffuse, specular, exponent;
     gather(diffuse, materials[hit->material[k]].diffuse);
     gather(specular, materials[hit->material[k]].specular);
@@ -24,14 +24,17 @@ HOT void direct_light(const Geometry *geometry, global const Light *lights, int 
         real_n amount = diffuse * cos_light;
         if (any_lane(shiny)) amount += choose(shiny, specular * pow(choose(shiny, cos_reflected, (real_n)1), exponent), (real_n)0);
         //@ light_amount
-        lit &= is_greater(amount * weight, (real_n)0);
+        mask_n wanted = is_greater(amount * weight, (real_n)0);
+        //@ light_lobes
+        lit &= wanted;
         if (!any_lane(lit)) continue;
         //@ visible
         amount = choose(lit, amount, (real_n)0);
-        for (int a = 0; a < 3; a++) sum[a] += amount * light->color[a];
+        //@ light_lit
+        for (int a = 0; a < 3; a++) shade->sum[a] += amount * light->color[a];
     }
 }
 
 //@hook light
-        direct_light(&geometry, lights, frame->light_count, materials, &rays, &hit, weight, sum);
+        direct_light(&geometry, lights, frame->light_count, materials, &rays, &hit, weight, &shade);
 //@end

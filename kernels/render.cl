@@ -37,15 +37,17 @@ render_packet(const int column, const int row, global const Frame *frame, global
         hit_surface(&geometry, frame, surfaces, &rays, &hits, &hit);
         //@ arrived
         // The light that leaves the hit points towards the viewer, without what other rays bring.
-        real_n sum[3], ambient;
+        Shade shade;
+        real_n ambient;
         gather(ambient, materials[hit.material[k]].ambient);
-        for (int a = 0; a < 3; a++) sum[a] = ambient;
+        //@ shade_begin
+        for (int a = 0; a < 3; a++) shade.sum[a] = ambient;
         //@ light
         for (int a = 0; a < 3; a++) {
             real_n albedo;
             gather(albedo, materials[hit.material[k]].color[a]);
             //@ albedo
-            const real_n seen = choose(hit.found, albedo * sum[a], (real_n)frame->background[a]);
+            real_n seen = choose(hit.found, albedo * shade.sum[a], (real_n)frame->background[a]);
             //@ channel
             color[a] += choose(rays.active, weight * seen, (real_n)0);
         }

@@ -79,6 +79,15 @@ class Material:
     absorb : how much of red, green, blue the medium behind the surface swallows a scene unit: exp(-absorb * length) is left
     fresnel_line, absorb_line : the lines that say so (0: none)
     texture : index into Scene.textures of the picture that multiplies the colour, -1 for none
+    emission : the radiance that the surface sends out by itself, on both sides; `emission_line` (arealight) asks for it
+    gloss : roughness of mirror and glass, 0 (polished) to 1; `gloss_line` asks for it
+    opacity : the part of light that the surface keeps from passing straight through; `opacity_line` asks for it
+    opacity_of : what it holds for, "all", or "shadow" alone: light from the lights
+    normal_map : index into Scene.textures of the picture that tilts the normals, -1 for none; `normal_strength` scales the tilt
+    metal_rough : the material is a metal-rough one as in glTF 2.0, of base colour `color`; `metallic` and `roughness` from 0 to 1;
+        `metal_rough_line` asks for it
+    metal_rough_map, emission_map : indices into Scene.textures, -1 for none: roughness in green and metallic in blue; colour of emission
+    alpha_cutoff : a picture's alpha below this is a hole, at or above it is none; 0: alpha is the surface's own opacity
     """
 
     color: tuple[float, float, float]
@@ -95,6 +104,22 @@ class Material:
     absorb: tuple[float, float, float] = (0.0, 0.0, 0.0)
     absorb_line: int = 0
     texture: int = -1
+    emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emission_line: int = 0
+    gloss: float = 0.0
+    gloss_line: int = 0
+    opacity: float = 1.0
+    opacity_line: int = 0
+    opacity_of: str = "all"
+    normal_map: int = -1
+    normal_strength: float = 1.0
+    metal_rough: bool = False
+    metallic: float = 0.0
+    roughness: float = 0.0
+    metal_rough_line: int = 0
+    metal_rough_map: int = -1
+    emission_map: int = -1
+    alpha_cutoff: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,11 +149,12 @@ class Texture:
 
 @dataclass(frozen=True)
 class PointLight:
-    """A point that shines in all directions without fall-off. `color` defaults to white."""
+    """A point that shines in all directions. `color` defaults to white. falloff : it is divided by the square of the distance."""
 
     position: tuple[float, float, float]
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)
     line: int = 0
+    falloff: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,6 +163,7 @@ class SpotLight:
 
     direction : unit, from the light into the cone, along its axis
     outer, inner : half-angles of the cone and of its bright part, radians, 0 <= inner <= outer; equal: a hard edge
+    falloff : `color` is divided by the square of the distance
     """
 
     position: tuple[float, float, float]
@@ -145,6 +172,7 @@ class SpotLight:
     inner: float
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)
     line: int = 0
+    falloff: bool = False
 
 
 @dataclass(frozen=True)
@@ -153,6 +181,58 @@ class SunLight:
 
     direction: tuple[float, float, float]
     color: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    line: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """Light from infinitely far away, from all directions, as a picture by longitude and latitude; in place of the background.
+
+    radiance : (h, w, 3) float64 linear, >= 0, row 0 at the top (+y); constant within a texel
+    rotation : radians about the y axis; at 0 the picture's middle column lies towards +z, and columns run to the right of one who looks there
+    """
+
+    radiance: FloatArray
+    rotation: float = 0.0
+    name: str = "environment"
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A thin lens in place of the pinhole. radius : of its disc, scene units; focus : distance of the plane that is sharp, along the view."""
+
+    radius: float
+    focus: float
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Shutter:
+    """When the picture is taken: times open <= close; what moves does so by its motion a unit of time. `eye_motion` : the eye's."""
+
+    open: float
+    close: float
+    eye_motion: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Fog:
+    """A medium that fills all space. density : what it takes from a ray, per scene unit; albedo : the part of that which it scatters;
+    asymmetry : -1 (back) to 1 (forward), of Henyey and Greenstein's phase function."""
+
+    density: float
+    albedo: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    asymmetry: float = 0.0
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Indirect:
+    """Light from surface to surface. clamp : greatest radiance that one path may bring after its first hit, inf: none is cut (unbiased)."""
+
+    clamp: float = float("inf")
     line: int = 0
 
 
@@ -169,6 +249,7 @@ class MeshObject:
     name : for people, such as "object 2"
     line : the line that calls for smooth normals (0: none)
     uvs : (n, 3, 2) float64 texture coordinates a corner, or None where no triangle of the scene has any
+    motion : scene units that the object moves a unit of time; `motion_line` asks for it
     """
 
     vertices: FloatArray
@@ -179,6 +260,8 @@ class MeshObject:
     name: str = "object"
     line: int = 0
     uvs: FloatArray | None = None
+    motion: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    motion_line: int = 0
 
     def __len__(self) -> int:
         return len(self.vertices)
@@ -225,6 +308,11 @@ class Scene:
     seed: int = 0
     spots: tuple[SpotLight, ...] = ()
     suns: tuple[SunLight, ...] = ()
+    environment: Environment | None = None
+    lens: Lens | None = None
+    shutter: Shutter | None = None
+    fog: Fog | None = None
+    indirect: Indirect | None = None
 
     @property
     def triangle_count(self) -> int:
