@@ -189,7 +189,7 @@ class Environment:
     """Light from infinitely far away, from all directions, as a picture by longitude and latitude; in place of the background.
 
     radiance : (h, w, 3) float64 linear, >= 0, row 0 at the top (+y); constant within a texel
-    rotation : radians about the y axis; at 0 the picture's middle column lies towards +z, and columns run to the right of one who looks there
+    rotation : radians about the y axis; at 0 the middle column lies towards +z, columns run to the right of one who looks there
     """
 
     radiance: FloatArray
@@ -200,7 +200,7 @@ class Environment:
 
 @dataclass(frozen=True)
 class Lens:
-    """A thin lens in place of the pinhole. radius : of its disc, scene units; focus : distance of the plane that is sharp, along the view."""
+    """A thin lens in place of the pinhole. radius : of its disc, scene units; focus : distance of the sharp plane, along the view."""
 
     radius: float
     focus: float
