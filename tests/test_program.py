@@ -24,6 +24,7 @@ WORDS = {
     "shadows": ("shadow", "light_planes"),
     "direct light": ("direct_light",),
     "spot": ("spot", "slope"),
+    "falloff": ("falloff",),
     "sun shadows": ("sun_reached", "sun_visible"),
     "sun": ("sun_light", "suns"),
     "fresnel": ("fresnel",),
@@ -55,7 +56,7 @@ def test_source_without_an_effect_holds_none_of_its_names(feature: Feature) -> N
     with_it = program.compose(ALL, rung("watertight"), 16, SHAPE)
     assert _traces(feature, with_it), "the words looked for must occur where the effect is on"
     dependents = {
-        "direct light": ("shadows", "spot"), "sun": ("sun shadows",), "bounce": ("mirror", "refraction", "fresnel", "absorption"),
+        "direct light": ("shadows", "spot", "falloff"), "sun": ("sun shadows",), "bounce": ("mirror", "refraction", "fresnel", "absorption"),
         "refraction": ("fresnel", "absorption"), "textures": ("globe",), "spheres": ("globe",),
     }.get(feature.name, ())  # fmt: skip
     dependents += {"sampler": ("sampling", "samples"), "sampling": ("samples",)}.get(feature.name, ())
@@ -104,7 +105,7 @@ def test_effects_and_pairs_of_them_compile_for_any_width(device: Device, names: 
     wanted |= {"refraction"} if {"fresnel", "absorption"} & wanted else set()
     wanted |= {"bounce"} if {"mirror", "refraction"} & wanted else set()
     wanted |= {"spheres", "textures"} if "globe" in wanted else set()
-    wanted |= {"direct light"} if {"shadows", "spot"} & wanted else set()
+    wanted |= {"direct light"} if {"shadows", "spot", "falloff"} & wanted else set()
     wanted |= {"sun"} if "sun shadows" in wanted else set()
     wanted |= {"sampler", "sampling"} if "samples" in wanted else set()
     lanes = {0: 16, 1: 8, 2: 4, 3: 1}[sum(map(ord, "".join(names))) % 4]

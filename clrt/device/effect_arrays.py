@@ -25,6 +25,8 @@ def _lights(packed: Packed) -> NDArray[np.void]:
     for i, light in enumerate(scene.lights_with_position):
         records["given"][i], records["color"][i] = light.position, light.color
         records["position"][i] = np.asarray(light.position) - packed.origin
+    if "falloff" in (records.dtype.names or ()):
+        records["falloff"] = [light.falloff for light in scene.lights_with_position]
     if "edge" in (records.dtype.names or ()):
         records["edge"], records["slope"] = 3.0, STEEPEST_EDGE
     if scene.spots:
@@ -34,6 +36,7 @@ def _lights(packed: Packed) -> NDArray[np.void]:
         rim = 2.0 * np.sin((outer + inner) / 2.0) * np.sin((outer - inner) / 2.0)
         cones["axis"], cones["edge"] = [spot.direction for spot in scene.spots], 2.0 * np.sin(outer / 2.0) ** 2
         cones["slope"] = 1.0 / np.maximum(rim, 1.0 / STEEPEST_EDGE)
+        cones["edge"][(inner >= np.pi)] = 3.0  # a whole turn, with a hard edge: no edge at all
     return records
 
 

@@ -27,6 +27,7 @@ FEATURES: tuple[Feature, ...] = (
     lamps.SHADOWS,
     lamps.DIRECT_LIGHT,
     lamps.SPOT,
+    lamps.FALLOFF,
     lamps.SUN_SHADOWS,
     lamps.SUN,
     surfaces.FRESNEL,

@@ -17,6 +17,10 @@ def _spot_caller(scene: Scene) -> int | None:
     return min((spot.line for spot in scene.spots), default=None)
 
 
+def _falloff_caller(scene: Scene) -> int | None:
+    return min((light.line for light in scene.lights_with_position if light.falloff), default=None)
+
+
 def sun_caller(scene: Scene) -> int | None:
     """The first sun."""
     return min((sun.line for sun in scene.suns), default=None)
@@ -37,6 +41,7 @@ DIRECT_LIGHT = Feature(
     parameters=(("lights", "global const Light *lights"),),
 )
 SPOT = Feature("spot", _spot_caller, "spot.cl", early=True, light=(("axis", REAL, (3,)), ("edge", REAL), ("slope", REAL)))
+FALLOFF = Feature("falloff", _falloff_caller, "falloff.cl", early=True, light=(("falloff", np.int32),))
 SUN_SHADOWS = Feature(
     "sun shadows", lambda scene: sun_caller(scene) if can_shadow(scene) else None, "sun_visible.cl", rays=("shadow",)
 )

@@ -34,7 +34,7 @@ def cone(light: Light, to_light: FloatArray) -> tuple[FloatArray, FloatArray]:
     to_light : (m, 3) unit. With h = 1 - cos of the angle to the axis, from 0 at the cone's edge to 1 at its bright part:
     s = (h_outer - h) / (h_outer - h_inner), and s^2 (3 - 2 s) is let through.
     """
-    if not isinstance(light, SpotLight):
+    if not isinstance(light, SpotLight) or light.inner >= np.pi:
         return np.ones(len(to_light)), np.full(len(to_light), np.inf)
     angle = 2.0 * np.arcsin(np.minimum(np.linalg.norm(to_light + np.array(light.direction), axis=1) / 2.0, 1.0))
     # cos a - cos b = 2 sin((b + a) / 2) sin((b - a) / 2): no cancellation.
@@ -44,3 +44,10 @@ def cone(light: Light, to_light: FloatArray) -> tuple[FloatArray, FloatArray]:
     gap = np.maximum(np.maximum(angle - light.outer, light.inner - angle), 0.0)
     hard = light.outer - light.inner < SHARP
     return s * s * (3.0 - 2.0 * s), gap if hard else np.full(len(gap), np.inf)
+
+
+def falloff(light: Light, distance: FloatArray) -> FloatArray:
+    """(m,): 1 / distance^2 for a light that falls off, else 1; 0 at the light itself, where nothing is lit."""
+    if isinstance(light, SunLight) or not light.falloff:
+        return np.ones(len(distance))
+    return np.divide(1.0, distance * distance, where=distance > 0.0, out=np.zeros(len(distance)))

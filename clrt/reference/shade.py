@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from clrt.reference.crossings import Rays
 from clrt.reference.geometry import MaterialTable, Primitives
-from clrt.reference.lights import Light, cone, positions
+from clrt.reference.lights import Light, cone, falloff, positions
 from clrt.reference.terminator import face_between, lifts
 from clrt.reference.visibility import occluded
 
@@ -180,8 +180,10 @@ def _light_term(
     above = (g_l > 0.0) | surface.curved
     lit = (n_l > 0.0) & above
     passed, gap = cone(light, unit)
+    weakened = falloff(light, distance)
+    shine, gloss = shine * weakened, gloss * weakened
     # At N.L = 0 only the specular term jumps; at n_geo.L = 0, unless curved, also the diffuse one, as far as the two normals differ.
-    at_geo = gloss + materials.diffuse[ids] * np.maximum(n_l - g_l, 0.0)
+    at_geo = gloss + materials.diffuse[ids] * np.maximum(n_l - g_l, 0.0) * weakened
     moved = np.divide(surface.pos_err, distance, where=distance > 0.0, out=np.full_like(distance, np.inf))
     by_shade, by_geo = np.abs(n_l) / (1.0 + moved + surface.curvature * surface.pos_err), np.abs(g_l) / (1.0 + moved)
     by_cone = np.where(lit & (np.abs(shine) * scale > NO_CONSEQUENCE), gap / (1.0 + moved), np.inf)

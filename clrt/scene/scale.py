@@ -42,7 +42,8 @@ def scaled(scene: Scene, exponent: int) -> Scene:
 
     def moved(light: PointLight | SpotLight) -> PointLight | SpotLight:
         x, y, z = times(np.asarray(light.position, np.float64)).tolist()
-        return replace(light, position=(x, y, z))
+        red, green, blue = np.ldexp(light.color, 2 * exponent if light.falloff else 0).tolist()
+        return replace(light, position=(x, y, z), color=(red, green, blue))
 
     def thinned(material: Material) -> Material:
         red, green, blue = np.ldexp(material.absorb, -exponent).tolist()
