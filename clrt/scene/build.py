@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from clrt.scene.camera import build_camera
+from clrt.scene.environment import read_environment
 from clrt.scene.faults import Faults
 from clrt.scene.grammar import LETTERS
 from clrt.scene.model import Material, MeshObject, PointLight, Scene, Spheres
@@ -57,6 +58,7 @@ def parse_scene(
     _check_materials(found, faults)
     _check_words(found, faults)
     textured = read_textures(found, folders or Folders(Path()), faults)
+    environment = read_environment(found, folders or Folders(Path()), faults)
     camera = build_camera(found, right_handed, faults)
     faults.raise_if_any()
     assert camera is not None  # a camera that cannot be built is a fault
@@ -68,13 +70,13 @@ def parse_scene(
         WORDS[call.name].apply(draft, call)
     _check_absorption(objects, draft.materials, found, faults)
     faults.raise_if_any()
-    if not (draft.lights or draft.spots or draft.suns):
+    if not (draft.lights or draft.spots or draft.suns or environment):
         warnings.append("there is no light (L); only the ambient part of the materials is seen")
     scene = Scene(
         camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,
         source, tuple(warnings), textures=textured.textures, spots=tuple(draft.spots), suns=tuple(draft.suns),
     )  # fmt: skip
-    scene = replace(scene, samples=draft.samples, samples_line=draft.samples_line)
+    scene = replace(scene, samples=draft.samples, samples_line=draft.samples_line, environment=environment)
     return _mirrored(scene) if right_handed else scene
 
 
@@ -176,6 +178,9 @@ def _mirrored(scene: Scene) -> Scene:
     lights = tuple(replace(light, position=_turned(light.position)) for light in scene.lights)
     spots = tuple(replace(spot, position=_turned(spot.position), direction=_turned(spot.direction)) for spot in scene.spots)
     suns = tuple(replace(sun, direction=_turned(sun.direction)) for sun in scene.suns)
+    # Its picture is never seen mirrored: only the way round in which it is turned changes.
+    around = scene.environment and replace(scene.environment, rotation=-scene.environment.rotation)
+    scene = replace(scene, environment=around)
     return replace(scene, lights=lights, spots=spots, suns=suns, objects=tuple(map(_mirrored_object, scene.objects)), spheres=spheres)
 
 
