@@ -73,7 +73,7 @@ def test_picture_does_not_depend_on_the_unit_of_length(exponent: int) -> None:
 
 def test_key_takes_yes_or_no() -> None:
     assert [parse_scene(WALL + f"spot 0 0 0  0 0 1  40 falloff={word}\n").spots[0].falloff for word in ("yes", "no")] == [True, False]
-    with pytest.raises(SceneError, match=r'9:35: error: falloff must be yes or no, found "maybe"'):
+    with pytest.raises(SceneError, match=r'9:36: error: falloff must be yes or no, found "maybe"'):
         parse_scene(WALL + "spot 0 0 0  0 0 1  40      falloff=maybe\n")
 
 
