@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from clrt.reference.environment import radiance
 from clrt.reference.lights import cone
 from clrt.reference.path_hits import seen
 from clrt.reference.path_world import Generator, PathWorld
@@ -117,17 +118,6 @@ def from_environment(environment: Environment, m: int, rng: Generator) -> Incomi
     """Of one direction each, uniform over the sphere: Le 4 pi."""
     direction = uniform_sphere(m, rng)
     return Incoming(direction, np.full(m, np.inf), 4.0 * np.pi * radiance(environment, direction), _none(m))
-
-
-def radiance(environment: Environment, direction: FloatArray) -> FloatArray:
-    """(m, 3) of the texels that unit directions (m, 3) point to: longitude from +z towards +x, latitude from +y down."""
-    height, width = environment.radiance.shape[:2]
-    x, y, z = direction.T
-    u = 0.5 + (np.arctan2(x, z) - environment.rotation) / (2.0 * np.pi)
-    v = np.arctan2(np.hypot(x, z), y) / np.pi
-    column = np.minimum(np.floor(np.mod(u, 1.0) * width), width - 1).astype(np.int64)
-    row = np.minimum(np.floor(v * height), height - 1).astype(np.int64)
-    return np.asarray(environment.radiance[row, column], np.float64)
 
 
 def uniform_sphere(m: int, rng: Generator) -> FloatArray:

@@ -20,7 +20,7 @@ from clrt.reference.lines import TILE_BYTES
 from clrt.reference.path_eye import eye_rays
 from clrt.reference.path_fog import fogged
 from clrt.reference.path_hits import closest, surfaces_met
-from clrt.reference.path_lights import radiance
+from clrt.reference.environment import radiance
 from clrt.reference.path_surfaces import direct, scattered
 from clrt.reference.path_world import Generator, PathWorld, Wave
 from clrt.reference.shade import Surface

@@ -14,6 +14,7 @@ from clrt.errors import SceneError
 from clrt.reference import media
 from clrt.reference.bounce import STACK_SIZE, MediumStack, Walls, bounces
 from clrt.reference.crossings import BAND, Rays
+from clrt.reference.environment import behind
 from clrt.reference.geometry import MaterialTable, Primitives
 from clrt.reference.lights import lights_of
 from clrt.reference.lines import TILE_BYTES
@@ -143,8 +144,9 @@ def _trace(world: _World, wave: _Wave, picture: ReferencePicture, depth: int) ->
     left = wave.tint * media.transmittance(world.absorption[wave.stack.top], t * wave.rays.speed)
     wave = replace(wave, tint=left, weight=np.where(left.any(axis=1), wave.weight, 0.0))
     missed, hit = np.flatnonzero(prim < 0), np.flatnonzero(prim >= 0)
-    background = np.array(world.scene.background, np.float64)
-    np.add.at(picture.pixels, wave.pixel[missed], wave.weight[missed, None] * left[missed] * background)
+    color, margin = behind(world.scene, wave.rays.direction[missed], wave.rays.dir_err[missed])
+    np.add.at(picture.pixels, wave.pixel[missed], wave.weight[missed, None] * left[missed] * color)
+    np.minimum.at(picture.margin, wave.pixel[missed], margin)
     wave, prim, t = _select(wave, hit), prim[hit], t[hit]
     surface = surfaces(world.prims, wave.rays, prim, t)
     color, margin, shadow_rays = local_color(
