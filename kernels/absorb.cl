@@ -1,5 +1,5 @@
 // Provides: absorb_along: what the medium around each ray leaves of its light (Beer and Lambert).
-// Needs: refraction.cl, hit.cl.  Reads: nothing.
+// Needs: refraction.cl, hit.cl, throughput.cl.  Reads: nothing.
 //
 // `absorption` holds three numbers an object, in the order of their ids: coefficients of red, green, blue, per scene unit.
 // A distance off by e changes what is left by the factor 1 - a e; the exponential itself is off by 3 units of the last place.
@@ -36,18 +36,6 @@ static __attribute__((noinline)) void absorb_along(const Media *inside, global c
     }
 }
 
-//@hook bounce_members
-    real_n tint[3];  // what media have left of red, green, blue on the way to the ray's origin
-//@end
-//@hook bounce_begin
-    for (int a = 0; a < 3; a++) current.tint[a] = (real_n)1;
-//@end
 //@hook arrived
         absorb_along(&current.media, media, absorption, &rays, &hit, current.tint);
-        real_n faded[3];
-        for (int a = 0; a < 3; a++) faded[a] = weight * current.tint[a];
-        weight = choose(is_greater(max_n(max_n(faded[0], faded[1]), faded[2]), (real_n)0), weight, (real_n)0);
-//@end
-//@hook channel
-            const real_n weight = faded[a];  // that of this colour, in place of the one they share
 //@end

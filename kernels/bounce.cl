@@ -92,3 +92,6 @@ HOT void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
 //@hook light_origin
             from_eye = current.from_eye;
 //@end
+//@hook light_draws
+            goes_on = current.depth_left > 0;
+//@end

@@ -102,7 +102,7 @@ HOT void smooth_lift(const Geometry *geometry, Hit *hit) {
 //@hook shadow_skip
     rays.skip |= hit->curved & is_at_least(dot_n(hit->geometric, rays.direction), (real_n)0);
 //@end
-//@hook sun_start
+//@hook reach_start
     for (int a = 0; a < 3; a++) {
         start[a] += hit->lift[a];
         error += (R(8.0) * UNIT_ROUNDOFF) * abs_n(hit->lift[a]);

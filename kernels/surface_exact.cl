@@ -81,7 +81,7 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
     hits.t = choose(planar, length + slack, hits.t);
     hits.low = choose(planar, length - slack, hits.low);
 //@end
-//@hook sun_start
+//@hook reach_start
     const Geometry seen = *geometry;
     const Rays copy = *rays;
     real_n refined[3] = {start[0], start[1], start[2]}, refined_error = error;

@@ -25,7 +25,20 @@ WORDS = {
     "direct light": ("direct_light",),
     "spot": ("spot", "slope"),
     "falloff": ("falloff",),
-    "sun shadows": ("sun_reached", "sun_visible"),
+    "sun shadows": ("sun_visible",),
+    "reach": ("reach",),
+    "path": ("path_pair", "draws"),
+    "path bounce": ("path_bounce",),
+    "throughput": ("tint[a]",),
+    "added": ("added",),
+    "mis": ("mis_share",),
+    "scatter": ("scatter_phong",),
+    "area light": ("arealight", "emitter"),
+    "area shadows": ("arealight_shadow",),
+    "area light mis": ("arealight_mis",),
+    "round area light": ("arealight_sphere",),
+    "indirect": ("indirect",),
+    "clamp": ("radiance_clamp",),
     "sun": ("sun_light", "suns"),
     "fresnel": ("fresnel",),
     "absorption": ("absor",),
@@ -37,6 +50,8 @@ WORDS = {
     "sampler": ("sampler",),
     "sampling": ("sampling", "sample_range"),
     "samples": ("antialias",),
+    "lens": ("lens",),
+    "wide eye": ("wide_eye",),
 }
 
 
@@ -59,7 +74,15 @@ def test_source_without_an_effect_holds_none_of_its_names(feature: Feature) -> N
         "direct light": ("shadows", "spot", "falloff"), "sun": ("sun shadows",), "bounce": ("mirror", "refraction", "fresnel", "absorption"),
         "refraction": ("fresnel", "absorption"), "textures": ("globe",), "spheres": ("globe",),
     }.get(feature.name, ())  # fmt: skip
-    dependents += {"sampler": ("sampling", "samples"), "sampling": ("samples",)}.get(feature.name, ())
+    dependents += {"sampler": ("sampling", "samples", "lens"), "sampling": ("samples", "lens")}.get(feature.name, ())
+    drawing = ("area light", "area shadows", "area light mis", "round area light", "indirect", "path", "path bounce", "scatter", "mis")
+    dependents += {
+        "sampler": drawing, "sampling": drawing, "path": drawing, "spheres": ("round area light",), "scatter": drawing,
+        "bounce": ("path bounce", "throughput", "mis", "area light mis", "round area light", "indirect", "clamp"),
+        "throughput": ("absorption", "indirect"), "added": drawing, "reach": ("sun shadows", "area shadows"),
+        "mis": ("area light mis", "round area light", "indirect"), "area light": ("area shadows", "area light mis", "round area light"),
+        "area light mis": ("round area light",), "indirect": ("clamp",), "path bounce": ("indirect",),
+    }.get(feature.name, ())  # fmt: skip
     left = Features(tuple(pair for pair in others.lines if pair[0] not in dependents))
     assert _traces(feature, program.compose(left, rung("watertight"), 16, SHAPE)) == []
 

@@ -235,7 +235,7 @@ def test_lone_triangle_throws_no_rays_to_the_sun() -> None:
 @pytest.mark.parametrize(
     ("lamps", "there", "absent"),
     [
-        ("sun 0 1 -1\n", ("sun_light", "sun_reached"), ("direct_light", "light_point", "lights", "light_planes", "spot", "shadow")),
+        ("sun 0 1 -1\n", ("sun_light", "reach_clear"), ("direct_light", "light_point", "lights", "light_planes", "spot", "shadow")),
         ("L 0 1 -1\n", ("direct_light", "shadow_lit"), ("sun_", "suns", "Sun", "spot", "axis;", "slope")),
         ("spot 0 1 -1 0 0 1 40\n", ("direct_light", "shadow_lit", "spot_factor", "slope"), ("sun_", "suns", "Sun")),
     ],

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device import layout, texels
+from clrt.device import arrays_environment, layout, texels
+from clrt.device.arrays_emitters import emitters
 from clrt.device.packed import FloatArray, Packed
 from clrt.device.program import MEDIA_DEPTH, light_dtype
 from clrt.scene.media import around_eye, ranks, refracting_materials
@@ -102,8 +103,11 @@ def _absorption(packed: Packed) -> NDArray[Any]:
 
 
 PACKERS: dict[str, Packer] = {
+    "emitters": emitters,
     "lights": _lights, "suns": _suns, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media, "absorption": _absorption,
     "sample_range": _sample_range, "sample_sums": _sample_sums,
+    "environment_cells": arrays_environment.cells, "environment_rows": arrays_environment.rows,
+    "environment_columns": arrays_environment.columns,
     "textures": lambda packed: texels.records(packed.scene.textures, packed.real), "corner_uvs": _corner_uvs,
     "texels": lambda packed: texels.codes(packed.scene.textures),
     "texel_values": lambda packed: texels.values(packed.scene.textures, packed.real),

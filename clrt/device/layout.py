@@ -78,6 +78,18 @@ def sun(real: type) -> np.dtype[np.void]:
     return struct_dtype([("direction", real, (3,)), ("color", real, (3,))])
 
 
+def emitter(real: type) -> np.dtype[np.void]:
+    """What shines, relative to the local origin: a triangle, or a sphere about `corner` where there is a radius."""
+    vector: Any = (real, (3,))
+    return struct_dtype([("corner", *vector), ("e1", *vector), ("e2", *vector), ("normal", *vector), ("radiance", *vector),
+                         ("luminance", real), ("area", real), ("sum", real), ("radius", real), ("bound", real)])  # fmt: skip
+
+
+def environment_row(real: type) -> np.dtype[np.void]:
+    """A row of the environment: cosines of its edges, the chance of a cell per word of its own, its first word, its cells up to the last lit."""
+    return struct_dtype([("top", np.float64), ("bottom", np.float64), ("density", real), ("begin", np.int32), ("lit", np.int32)])
+
+
 def sphere(real: type) -> np.dtype[np.void]:
     """A sphere relative to the local origin, rounded, and as it is: centre and radius."""
     return struct_dtype([("given", np.float64, (4,)), ("center", real, (3,)), ("radius", real), ("material", np.int32)])

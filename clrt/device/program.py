@@ -4,6 +4,7 @@ Kernel files carry three kinds of marks, all C comments:
 
     //@ place                a place where effects add code
     //@hook place ... //@end at the end of an effect's file: the code it adds at `place`
+    //@hook place_default    code that stands at `place` where no effect adds any there
     //@counting code         a line of the counting build alone
 
 Every chunk of the composed text starts with `#line 1 "name.cl"`, so that a compiler's message names the file to open.
@@ -98,6 +99,7 @@ def _structs(features: Features, precision: Precision, entry: str) -> str:
     declared = " ".join(declaration for f in features.active for _, declaration in f.parameters)
     optional = (
         ("Light", partial(light_dtype, features)), ("Sphere", layout.sphere), ("Texture", layout.texture), ("Sun", layout.sun),
+        ("Emitter", layout.emitter), ("EnvironmentRow", layout.environment_row),
     )  # fmt: skip
     names += [(name, make(real)) for name, make in optional if f" {name} " in declared]
     if entry == "cast":
@@ -106,7 +108,7 @@ def _structs(features: Features, precision: Precision, entry: str) -> str:
 
 
 def material_dtype(features: Features, precision: Precision) -> np.dtype[np.void]:
-    return layout.material(precision.real, [(n, precision.real if t is REAL else t) for f in features.active for n, t in f.material])
+    return layout.material(precision.real, [(n, precision.real if t is REAL else t, *shape) for f in features.active for n, t, *shape in f.material])
 
 
 def light_dtype(features: Features, real: type) -> np.dtype[np.void]:
@@ -114,7 +116,7 @@ def light_dtype(features: Features, real: type) -> np.dtype[np.void]:
 
 
 def frame_dtype(features: Features, precision: Precision) -> np.dtype[np.void]:
-    return layout.frame(precision.real, [(n, precision.real if t is REAL else t) for f in features.active for n, t, _ in f.frame])
+    return layout.frame(precision.real, [(n, precision.real if t is REAL else t, *shape) for f in features.active for n, t, *shape, _ in f.frame])
 
 
 def _defines(features: Features, precision: Precision, lanes: int, shape: Shape, counting: bool) -> str:
@@ -142,7 +144,7 @@ def _insert(name: str, text: str, hooks: dict[str, list[tuple[str, str, int]]]) 
         if not place:
             out.append(line)
             continue
-        found = hooks.get(place[1], [])
+        found = hooks.get(place[1]) or hooks.get(f"{place[1]}_default", [])
         for file, code, first in found:
             out += [f'#line {first} "{file}"', _insert(file, code, hooks).rstrip("\n")]
         if not found and place[1] in _DEFAULTS:

@@ -9,10 +9,11 @@ a reference function, a smallest scene and a test. No other effect's file change
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
-from clrt.features import camera, helpers, lamps, shapes, surfaces
-from clrt.features.feature import REAL, Feature
+from clrt.features import camera, helpers, lamps, sampled, shapes, surfaces, surroundings
+from clrt.features.feature import REAL, Calls, Feature
 from clrt.scene.model import Scene
 
 __all__ = ["FEATURES", "HELPERS", "REAL", "Feature", "Features"]
@@ -20,23 +21,42 @@ __all__ = ["FEATURES", "HELPERS", "REAL", "Feature", "Features"]
 #: in the order of the program: code at the same place runs in this order
 FEATURES: tuple[Feature, ...] = (
     helpers.SAMPLER,
+    camera.LENS,
     helpers.SAMPLING,
     camera.SAMPLES,
+    helpers.WIDE_EYE,
+    helpers.PATH,
     shapes.SPHERES,
     shapes.SMOOTH,
     lamps.SHADOWS,
     lamps.DIRECT_LIGHT,
     lamps.SPOT,
     lamps.FALLOFF,
+    helpers.REACH,
     lamps.SUN_SHADOWS,
     lamps.SUN,
     surfaces.FRESNEL,
     surfaces.REFRACTION,
     surfaces.ABSORPTION,
     surfaces.MIRROR,
+    helpers.BOUNCE,
+    helpers.PATH_BOUNCE,
+    helpers.ADDED,
+    surroundings.ENVIRONMENT,
+    helpers.THROUGHPUT,
+    helpers.MIS,
+    sampled.INDIRECT,
+    sampled.CLAMP,
+    helpers.SCATTER,
+    surroundings.ENVIRONMENT_LIGHT,
+    surroundings.ENVIRONMENT_SHADOWS,
+    helpers.ENVIRONMENT_MIS,
+    sampled.AREA_LIGHT,
+    sampled.AREA_SHADOWS,
+    helpers.AREA_MIS,
+    helpers.AREA_SPHERE,
     helpers.GLOBE,
     surfaces.TEXTURES,
-    helpers.BOUNCE,
 )
 HELPERS = frozenset(f.name for f in FEATURES if f.helper)  #: parts that effects share; not effects of their own
 
@@ -48,9 +68,20 @@ class Features:
     lines: tuple[tuple[str, int], ...]
 
     @classmethod
-    def of(cls, scene: Scene) -> Features:
-        """What `scene` calls for."""
-        return cls(tuple((f.name, line) for f in FEATURES if (line := f.called_by(scene)) is not None))
+    def of(cls, scene: Scene, without: Iterable[str] = ()) -> Features:
+        """What `scene` calls for; left out are the effects called `without`, what needs them, and helpers that nothing needs any more."""
+        dropped = frozenset(without)
+        return cls._where(lambda feature: None if feature.name in dropped else feature.called_by(scene))
+
+    @classmethod
+    def named(cls, names: Iterable[str]) -> Features:
+        """Just the effects of these names, with the helpers that they need, as if line 0 of some scene called for them."""
+        wanted = frozenset(names)
+        return cls._where(lambda feature: 0 if feature.name in wanted else None)
+
+    @classmethod
+    def _where(cls, calls: Calls) -> Features:
+        return cls(tuple((f.name, line) for f in FEATURES if (line := f.line(calls)) is not None))
 
     @property
     def active(self) -> tuple[Feature, ...]:

@@ -23,13 +23,14 @@ class Feature:
     called_by : scene -> number of the first line that calls for it (0: no text), None where none does
     kernel : its file in kernels/
     early : its file stands before the scene's traversal, which calls it
-    material : members it adds to the Material struct; each is an attribute of `scene.model.Material`
+    material : members it adds to the Material struct: name, type, shape if it is no scalar; each is an attribute of `scene.model.Material`
     light : members it adds to the Light struct: name, type, shape if it is no scalar
-    frame : members it adds to the Frame struct, with their values
+    frame : members it adds to the Frame struct: name, type, shape if it is no scalar, and the function of the scene that gives the value
     parameters : kernel arguments it adds: name of the packer in device/pack.py -> C declaration
     rays : kinds of rays it spawns, as the counters name them
     branches : packets of rays that it may send on from one hit
     sampled : it draws random numbers: what is seen is a mean of samples
+    needs : what must be in the program for this one to be: without one of these there is nothing that it could change
     helper : a part that effects share; no effect of its own
     """
 
@@ -37,14 +38,43 @@ class Feature:
     called_by: Caller
     kernel: str
     early: bool = False
-    material: tuple[tuple[str, Any], ...] = ()
+    material: tuple[tuple[Any, ...], ...] = ()
     light: tuple[tuple[Any, ...], ...] = ()
-    frame: tuple[tuple[str, Any, Callable[[Scene], Any]], ...] = ()
+    frame: tuple[tuple[Any, ...], ...] = ()
     parameters: tuple[tuple[str, str], ...] = ()
     rays: tuple[str, ...] = ()
     branches: int = 0
     sampled: bool = False
+    needs: tuple[Feature, ...] = ()
     helper: bool = False
+
+    def line(self, calls: Calls) -> int | None:
+        """The line that calls for it where `calls` tells that of each effect; None where nothing does, or what it needs is not there."""
+        if any(needed.line(calls) is None for needed in self.needs):
+            return None
+        return self.called_by.line(calls) if isinstance(self.called_by, Joint) else calls(self)
+
+
+Calls = Callable[[Feature], "int | None"]  #: an effect -> the line that calls for it, None where it is not to be
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Calls for a part that others share: where any of `parts` is in the program, or, with `every`, where all are."""
+
+    parts: tuple[Feature | Joint, ...]
+    every: bool = False
+
+    def __call__(self, scene: Scene) -> int | None:
+        return self.line(lambda feature: feature.called_by(scene))
+
+    def line(self, calls: Calls) -> int | None:
+        """The first of the parts' lines; with `every` the last, at which all are called for."""
+        lines = [part.line(calls) for part in self.parts]
+        there = [line for line in lines if line is not None]
+        if self.every:
+            return max(there, default=None) if len(there) == len(lines) else None
+        return min(there, default=None)
 
 
 def used_materials(scene: Scene) -> Iterator[Material]:
@@ -53,15 +83,6 @@ def used_materials(scene: Scene) -> Iterator[Material]:
     for item in scene.objects:
         used |= set(np.unique(item.material_ids).tolist())
     return (scene.materials[i] for i in sorted(used))
-
-
-def first_line(*callers: Caller) -> Caller:
-    """Calls for an effect where any of `callers` does; the first line of all."""
-
-    def called_by(scene: Scene) -> int | None:
-        return min((line for caller in callers if (line := caller(scene)) is not None), default=None)
-
-    return called_by
 
 
 def material_caller(attribute: str) -> Caller:

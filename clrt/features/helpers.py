@@ -4,17 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.features import camera, surfaces
-from clrt.features.feature import Caller, Feature, first_line
+from clrt.features import camera, lamps, sampled, shapes, surfaces, surroundings
+from clrt.features.feature import Feature, Joint
 
 #: effects that draw random numbers
-_SAMPLED: tuple[Feature, ...] = (camera.SAMPLES,)
+_SAMPLED: tuple[Feature, ...] = (camera.SAMPLES, camera.LENS, sampled.AREA_LIGHT, sampled.INDIRECT, surroundings.ENVIRONMENT_LIGHT)
 #: effects that send rays on from a hit
-_BOUNCING: tuple[Feature, ...] = (surfaces.MIRROR, surfaces.REFRACTION)
+_BOUNCING: tuple[Feature, ...] = (surfaces.MIRROR, surfaces.REFRACTION, sampled.INDIRECT)
+#: effects that draw at the hits of rays, not only at the eye
+_DRAWING: tuple[Feature, ...] = (sampled.AREA_LIGHT, sampled.INDIRECT, surroundings.ENVIRONMENT_LIGHT)
+#: effects that weigh red, green and blue of a ray apart
+_TINTING: tuple[Feature, ...] = (surfaces.ABSORPTION, sampled.INDIRECT)
+#: effects that add light without the surface's colour
+_ADDING: tuple[Feature, ...] = (sampled.AREA_LIGHT,)
+#: effects that ask whether a hit sees a light, from the hit
+_REACHING: tuple[Feature, ...] = (lamps.SUN_SHADOWS, sampled.AREA_SHADOWS, surroundings.ENVIRONMENT_SHADOWS)
+#: effects that draw directions to lights; those whose drawn rays may meet these lights, too
+_LIGHT_DRAWING: tuple[Feature, ...] = (sampled.AREA_LIGHT, surroundings.ENVIRONMENT_LIGHT)
+_RAY_DRAWING: tuple[Feature, ...] = (sampled.INDIRECT,)
 
 
-def _any_of(features: tuple[Feature, ...]) -> Caller:
-    return first_line(*(f.called_by for f in features))
+def _any_of(features: tuple[Feature | Joint, ...]) -> Joint:
+    return Joint(features)
+
+
+def _all_of(*parts: Feature | Joint) -> Joint:
+    return Joint(parts, every=True)
 
 
 SAMPLER = Feature("sampler", _any_of(_SAMPLED), "sampler.cl", helper=True)
@@ -26,7 +41,19 @@ SAMPLING = Feature(
     parameters=(("sample_range", "global const int *sample_range"), ("sample_sums", "global double *sample_sums")),
     helper=True,
 )
-GLOBE = Feature("globe", surfaces.globe_caller, "globe.cl", helper=True)
+#: rays from the eye do not share their origin
+WIDE_EYE = Feature("wide eye", _any_of((camera.LENS,)), "wide_eye.cl", helper=True)
+GLOBE = Feature("globe", surfaces.globe_caller, "globe.cl", needs=(shapes.SPHERES, surfaces.TEXTURES), helper=True)
 BOUNCE = Feature(
     "bounce", _any_of(_BOUNCING), "bounce.cl", frame=(("depth", np.int32, lambda scene: scene.depth),), branches=1, helper=True
 )
+PATH = Feature("path", _any_of(_DRAWING), "path.cl", helper=True)
+PATH_BOUNCE = Feature("path bounce", _all_of(PATH, BOUNCE), "path_bounce.cl", helper=True)
+THROUGHPUT = Feature("throughput", _any_of(_TINTING), "throughput.cl", helper=True)
+ADDED = Feature("added", _any_of(_ADDING), "added.cl", helper=True)
+REACH = Feature("reach", _any_of(_REACHING), "reach.cl", helper=True)
+SCATTER = Feature("scatter", _any_of(_LIGHT_DRAWING), "scatter.cl", helper=True)
+MIS = Feature("mis", _all_of(_any_of(_LIGHT_DRAWING), _any_of(_RAY_DRAWING)), "mis.cl", helper=True)
+AREA_MIS = Feature("area light mis", _all_of(sampled.AREA_LIGHT, MIS), "arealight_mis.cl", helper=True)
+AREA_SPHERE = Feature("round area light", _all_of(AREA_MIS, shapes.SPHERES), "arealight_sphere.cl", helper=True)
+ENVIRONMENT_MIS = Feature("environment mis", _all_of(surroundings.ENVIRONMENT_LIGHT, MIS), "environment_mis.cl", helper=True)

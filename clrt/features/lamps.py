@@ -30,9 +30,6 @@ def _shadow_caller(scene: Scene) -> int | None:
     return _light_caller(scene) if can_shadow(scene) else None
 
 
-SHADOWS = Feature(
-    "shadows", _shadow_caller, "shadow.cl", parameters=(("light_planes", "global const EdgePlanes *light_planes"),), rays=("shadow",)
-)
 DIRECT_LIGHT = Feature(
     "direct light",
     _light_caller,
@@ -40,15 +37,29 @@ DIRECT_LIGHT = Feature(
     frame=(("light_count", np.int32, lambda scene: len(scene.lights_with_position)),),
     parameters=(("lights", "global const Light *lights"),),
 )
-SPOT = Feature("spot", _spot_caller, "spot.cl", early=True, light=(("axis", REAL, (3,)), ("edge", REAL), ("slope", REAL)))
-FALLOFF = Feature("falloff", _falloff_caller, "falloff.cl", early=True, light=(("falloff", np.int32),))
-SUN_SHADOWS = Feature(
-    "sun shadows", lambda scene: sun_caller(scene) if can_shadow(scene) else None, "sun_visible.cl", rays=("shadow",)
+SHADOWS = Feature(
+    "shadows",
+    _shadow_caller,
+    "shadow.cl",
+    parameters=(("light_planes", "global const EdgePlanes *light_planes"),),
+    rays=("shadow",),
+    needs=(DIRECT_LIGHT,),
 )
+SPOT = Feature(
+    "spot", _spot_caller, "spot.cl", early=True, light=(("axis", REAL, (3,)), ("edge", REAL), ("slope", REAL)), needs=(DIRECT_LIGHT,)
+)
+FALLOFF = Feature("falloff", _falloff_caller, "falloff.cl", early=True, light=(("falloff", np.int32),), needs=(DIRECT_LIGHT,))
 SUN = Feature(
     "sun",
     sun_caller,
     "sun.cl",
     frame=(("sun_count", np.int32, lambda scene: len(scene.suns)),),
     parameters=(("suns", "global const Sun *suns"),),
+)
+SUN_SHADOWS = Feature(
+    "sun shadows",
+    lambda scene: sun_caller(scene) if can_shadow(scene) else None,
+    "sun_visible.cl",
+    rays=("shadow",),
+    needs=(SUN,),
 )

@@ -28,7 +28,6 @@ def globe_caller(scene: Scene) -> int | None:
     return min((scene.textures[t].line for i in used if (t := scene.materials[i].texture) >= 0), default=None)
 
 
-FRESNEL = Feature("fresnel", _fresnel_caller, "fresnel.cl", material=(("fresnel", np.int32),), rays=("fresnel",))
 REFRACTION = Feature(
     "refraction",
     material_caller("refract"),
@@ -38,7 +37,14 @@ REFRACTION = Feature(
     rays=("refracted", "internal"),
     branches=1,
 )
-ABSORPTION = Feature("absorption", _absorption_caller, "absorb.cl", parameters=(("absorption", "global const real *absorption"),))
+FRESNEL = Feature("fresnel", _fresnel_caller, "fresnel.cl", material=(("fresnel", np.int32),), rays=("fresnel",), needs=(REFRACTION,))
+ABSORPTION = Feature(
+    "absorption",
+    _absorption_caller,
+    "absorb.cl",
+    parameters=(("absorption", "global const real *absorption"),),
+    needs=(REFRACTION,),
+)
 MIRROR = Feature("mirror", material_caller("reflect"), "mirror.cl", material=(("reflect", REAL),), rays=("mirror",))
 TEXTURES = Feature(
     "textures",

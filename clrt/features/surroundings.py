@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.features.feature import Feature
-from clrt.scene.model import Environment, Scene
+from clrt.features.feature import Feature, used_materials
+from clrt.features.shapes import can_shadow
+from clrt.scene.model import Environment, Material, Scene
+from clrt.scene.skylight import lit_count, row_words
 
 
 def environment_caller(scene: Scene) -> int | None:
@@ -23,6 +25,19 @@ def _turn(scene: Scene) -> float:
     return float(_of(scene).rotation / (2.0 * np.pi) % 1.0)
 
 
+def _is_lit(material: Material) -> bool:
+    """The surface hands on light from all around; mirrors and polished glass show it to their own rays alone."""
+    phong = max(material.color) > 0.0 and max(material.diffuse, material.specular) > 0.0
+    return phong or material.metal_rough or material.gloss > 0.0
+
+
+def light_caller(scene: Scene) -> int | None:
+    """An environment that shines on something: one that is only seen needs no samples."""
+    if scene.environment is None or not scene.environment.radiance.any() or not any(map(_is_lit, used_materials(scene))):
+        return None
+    return scene.environment.line
+
+
 ENVIRONMENT = Feature(
     "environment",
     environment_caller,
@@ -33,4 +48,23 @@ ENVIRONMENT = Feature(
         ("environment_height", np.int32, lambda scene: _of(scene).radiance.shape[0]),
     ),
     parameters=(("environment_cells", "global const real *environment_cells"),),
+)
+ENVIRONMENT_LIGHT = Feature(
+    "environment light",
+    light_caller,
+    "environment_light.cl",
+    frame=(("environment_lit", np.int32, lambda scene: int(lit_count(row_words(_of(scene))))),),
+    parameters=(
+        ("environment_rows", "global const EnvironmentRow *environment_rows"),
+        ("environment_columns", "global const uint *environment_columns"),
+    ),
+    sampled=True,
+    needs=(ENVIRONMENT,),
+)
+ENVIRONMENT_SHADOWS = Feature(
+    "environment shadows",
+    lambda scene: light_caller(scene) if can_shadow(scene) else None,
+    "environment_shadow.cl",
+    rays=("shadow",),
+    needs=(ENVIRONMENT_LIGHT,),
 )

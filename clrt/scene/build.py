@@ -15,11 +15,12 @@ from clrt.scene.camera import build_camera
 from clrt.scene.environment import read_environment
 from clrt.scene.faults import Faults
 from clrt.scene.grammar import LETTERS
-from clrt.scene.model import Material, MeshObject, PointLight, Scene, Spheres
+from clrt.scene.instances import build_instances, splits
+from clrt.scene.model import Instance, Material, MeshObject, PointLight, Scene, Spheres
 from clrt.scene.objects import build_objects, material_of
 from clrt.scene.picture import Folders
 from clrt.scene.text import Declarations, read_declarations, read_file
-from clrt.scene.textures import read_textures
+from clrt.scene.textures import read_textures, untilted
 from clrt.scene.triangles import flip_x
 from clrt.scene.words import WORDS, Draft
 
@@ -64,19 +65,22 @@ def parse_scene(
     assert camera is not None  # a camera that cannot be built is a fault
 
     warnings: list[str] = []
-    objects = build_objects(found, split_objects, warnings, textured.uvs)
+    objects = build_objects(found, splits(found, split_objects, warnings), warnings, textured.uvs)
+    objects, instances = build_instances(objects, found, faults)
     draft = Draft(textured.materials(_materials(found)), _lights(found))
     for call in found.words:
         WORDS[call.name].apply(draft, call)
     _check_absorption(objects, draft.materials, found, faults)
     faults.raise_if_any()
-    if not (draft.lights or draft.spots or draft.suns or environment):
+    if not (draft.lights or draft.spots or draft.suns or environment or any(max(m.emission) > 0.0 for m in draft.materials)):
         warnings.append("there is no light (L); only the ambient part of the materials is seen")
+    warnings += untilted(objects, draft.materials)
     scene = Scene(
         camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,
         source, tuple(warnings), textures=textured.textures, spots=tuple(draft.spots), suns=tuple(draft.suns),
     )  # fmt: skip
-    scene = replace(scene, samples=draft.samples, samples_line=draft.samples_line, environment=environment)
+    scene = replace(scene, samples=draft.samples, samples_line=draft.samples_line, lens=draft.lens, environment=environment, **draft.fields)
+    scene = replace(scene, instances=instances)
     return _mirrored(scene) if right_handed else scene
 
 
@@ -181,6 +185,8 @@ def _mirrored(scene: Scene) -> Scene:
     # Its picture is never seen mirrored: only the way round in which it is turned changes.
     around = scene.environment and replace(scene.environment, rotation=-scene.environment.rotation)
     scene = replace(scene, environment=around)
+    instances = tuple(map(_mirrored_instance, scene.instances))
+    scene = replace(scene, instances=instances)
     return replace(scene, lights=lights, spots=spots, suns=suns, objects=tuple(map(_mirrored_object, scene.objects)), spheres=spheres)
 
 
@@ -191,3 +197,9 @@ def _turned(vector: tuple[float, float, float]) -> tuple[float, float, float]:
 def _mirrored_object(mesh: MeshObject) -> MeshObject:
     smooth = None if mesh.vertex_normals is None else flip_x(mesh.vertex_normals)
     return replace(mesh, vertices=flip_x(mesh.vertices), normals=flip_x(mesh.normals), vertex_normals=smooth)
+
+
+def _mirrored_instance(instance: Instance) -> Instance:
+    """What mirrors the object before and the world after: x turned round in both."""
+    turned = instance.world_from_object * np.array([[1.0, -1.0, -1.0, -1.0], [-1.0, 1.0, 1.0, 1.0], [-1.0, 1.0, 1.0, 1.0]])
+    return replace(instance, world_from_object=turned + 0.0)

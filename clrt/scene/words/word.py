@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
 from clrt.scene.faults import Faults
 from clrt.scene.grammar import Field, color_fields
-from clrt.scene.model import Material, PointLight, SpotLight, SunLight
+from clrt.scene.model import Lens, Material, PointLight, SpotLight, SunLight
 
 Value = float | str
 
@@ -62,6 +62,8 @@ class Draft:
     depth: int = 5
     samples: int = 1
     samples_line: int = 0
+    fields: dict[str, Any] = field(default_factory=dict)  #: of the Scene, by name, that words set as a whole
+    lens: Lens | None = None
 
 
 @dataclass(frozen=True)

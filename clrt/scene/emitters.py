@@ -1,0 +1,73 @@
+"""What shines: the primitives whose material sends out light, with how much of it each sends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.scene.model import FloatArray, Scene
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  #: of linear red, green, blue (ITU-R BT.709)
+
+
+@dataclass(frozen=True, eq=False)
+class Emitters:
+    """k emitters, triangles first.
+
+    vertices : (k, 3, 3) float64, of a sphere its centre three times; radius : (k,) 0 for triangles
+    radiance : (k, 3); area : (k,); triangles of zero area are left out
+    """
+
+    vertices: FloatArray
+    radius: FloatArray
+    radiance: FloatArray
+    area: FloatArray
+
+    @property
+    def luminance(self) -> FloatArray:
+        """(k,) of the radiance."""
+        return np.asarray(self.radiance @ LUMINANCE)
+
+    @property
+    def power(self) -> FloatArray:
+        """(k,) area times luminance: in proportion to what each is drawn."""
+        return self.area * self.luminance
+
+
+def _shining(scene: Scene) -> NDArray[np.bool_]:
+    """(materials,): light that a picture (emission_map) shapes is found by rays that meet it alone."""
+    return np.array([max(m.emission) > 0.0 and m.emission_map < 0 for m in scene.materials], np.bool_)
+
+
+def emitters_of(scene: Scene) -> Emitters:
+    """The emitters of a scene."""
+    shining, radiance = _shining(scene), np.array([m.emission for m in scene.materials]).reshape(-1, 3)
+    corners, ids = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)]
+    for item in scene.objects:
+        chosen = shining[item.material_ids]
+        corners.append(item.vertices[chosen])
+        ids.append(item.material_ids[chosen].astype(np.int64))
+    vertices, material = np.concatenate(corners), np.concatenate(ids)
+    area = np.linalg.norm(np.cross(vertices[:, 1] - vertices[:, 0], vertices[:, 2] - vertices[:, 0]), axis=1) / 2.0
+    flat = area > 0.0
+    vertices, material, area = vertices[flat], material[flat], area[flat]
+    balls = np.flatnonzero(shining[scene.spheres.material_ids])
+    radius = scene.spheres.radii[balls]
+    return Emitters(
+        np.concatenate([vertices, np.repeat(scene.spheres.centers[balls][:, None], 3, axis=1)]),
+        np.concatenate([np.zeros(len(vertices)), radius]),
+        radiance[np.concatenate([material, scene.spheres.material_ids[balls].astype(np.int64)])],
+        np.concatenate([area, 4.0 * np.pi * radius**2]),
+    )
+
+
+def emitter_count(scene: Scene) -> int:
+    """How many emitters the scene has."""
+    return len(emitters_of(scene).area)
+
+
+def emitter_power(scene: Scene) -> float:
+    """The sum of their powers, 1 where there is none."""
+    return float(emitters_of(scene).power.sum()) or 1.0

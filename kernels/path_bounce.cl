@@ -1,0 +1,17 @@
+// Provides: numbers of the paths of rays that go on: each sends on as many as it likes, all with numbers of their own.
+// Needs: path.cl, bounce.cl.  Reads: nothing.
+
+//@hook bounce_members
+    uint path;
+//@end
+//@hook bounce_begin
+    current.path = 1;
+//@end
+//@hook bounce_pushed
+    // The place on the stack sets what goes on from the same hit apart. The factor is odd (2^32 over the golden ratio): no two numbers fall together
+    // along a way.
+    next->path = from->path * 0x9e3779b1u + (uint)stack->count;
+//@end
+//@hook next
+        path = current.path;
+//@end
