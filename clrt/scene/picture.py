@@ -9,7 +9,7 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,8 +53,8 @@ def _nearby(path: Path) -> str:
     return f'; did you mean "{near[0]}"?' if near else ""
 
 
-def read_picture(path: Path, name: str) -> Picture:
-    """The picture of a file. Raises PictureError for what is no picture, is cut off, has no size or more than one frame."""
+def read_picture(path: Path | IO[bytes], name: str) -> Picture:
+    """The picture of a file, or of its bytes. Raises PictureError for what is no picture, is cut off, has no size or more than one frame."""
     from PIL import Image, UnidentifiedImageError
 
     try:

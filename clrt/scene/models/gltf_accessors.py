@@ -77,7 +77,8 @@ def _strided(document: Document, item: Item, key: str, offset: int, kind: np.dty
         raise item.fault(f"{count} elements reach beyond the {len(data)} bytes of its buffer view {index}: the file is cut off or wrong")
     if not count:
         return np.zeros((0, width), kind)
-    return np.ndarray((count, width), kind, data, offset, (stride, kind.itemsize))
+    strided: NDArray[Any] = np.ndarray((count, width), kind, data, offset, (stride, kind.itemsize))
+    return strided
 
 
 def _overwrite(document: Document, values: NDArray[Any], sparse: Item) -> NDArray[Any]:
