@@ -237,8 +237,8 @@ def test_mesh_instead_of_a_scene_says_how_to_convert(run: Run, tmp_path: Path) -
     ("arguments", "says"),
     [
         (["-o", "no/a.png"], "no folder"),
-        (["-o", "a.jpg"], ".png or .ppm"),
-        (["-o", "a"], ".png or .ppm"),
+        (["-o", "a.jpg"], ".png, .ppm or .exr"),
+        (["-o", "a"], ".png, .ppm or .exr"),
         (["-o", "folder"], "folder"),
         (["--stats", "no/s.json"], "no folder"),
         (["--dump-kernel", "no/k.cl"], "no folder"),

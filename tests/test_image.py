@@ -115,8 +115,8 @@ def test_repr_png_is_a_png() -> None:
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a", "png", "a.png.txt"])
-def test_check_format_other_endings_name_the_two(name: str) -> None:
-    with pytest.raises(clrt.ClrtError, match=r"\.png or \.ppm"):
+def test_check_format_other_endings_name_those(name: str) -> None:
+    with pytest.raises(clrt.ClrtError, match=r"\.png, \.ppm or \.exr"):
         check_format(name)
 
 

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from clrt.errors import ClrtError
 from clrt.files import atomic_write, check_writable
-from clrt.image import png, ppm
+from clrt.image import exr, png, ppm
 from clrt.stats import RunStats
 
 _WRITERS: dict[str, Callable[[BinaryIO, NDArray[np.uint8], bool], None]] = {".png": png.write, ".ppm": ppm.write}
+_LINEAR = ".exr"  #: holds numbers as they are
 
 _BLOCK_ROWS = 64  #: rows encoded at a time, so that float64 work arrays stay in the cache
 
@@ -68,27 +69,35 @@ class Image:
         return out
 
     def save(self, path: str | PathLike[str], *, srgb: bool = False) -> None:
-        """Write a .png or .ppm, whole or not at all; `srgb` encodes, else the linear values are written.
+        """Write a .png or .ppm, whole or not at all; `srgb` encodes, else the linear values are written. An .exr holds them unclamped.
 
-        Raises ClrtError for any other ending, OSError with the path in it where it cannot be written.
+        Raises ClrtError for any other ending, for an .exr with `srgb` or without its library, OSError with the path in it where it cannot
+        be written.
         """
-        write = _WRITERS[check_format(path)]
+        suffix = check_format(path, srgb)
         check_writable(path)
-        pixels = self.to_uint8(srgb)
+        pixels = None if suffix == _LINEAR else self.to_uint8(srgb)
         with atomic_write(path) as file:
-            write(file, pixels, srgb)
+            if pixels is None:
+                exr.write(file, self.pixels)
+            else:
+                _WRITERS[suffix](file, pixels, srgb)
 
     def _repr_png_(self) -> bytes:
         """What a notebook shows."""
         return png.encode(self.to_uint8())
 
 
-def check_format(path: str | PathLike[str]) -> str:
-    """The ending of `path` in lower case. Raises ClrtError where it is none that can be written."""
+def check_format(path: str | PathLike[str], srgb: bool = False) -> str:
+    """The ending of `path` in lower case. Raises ClrtError where it is none that can be written, or is not encoded as `srgb` asks."""
     suffix = Path(path).suffix.lower()
-    if suffix not in _WRITERS:
+    if suffix == _LINEAR:
+        exr.check()
+        if srgb:
+            raise ClrtError(f"{fspath(path)}: an .exr holds linear values, never sRGB; leave out --srgb, or write a .png")
+    elif suffix not in _WRITERS:
         found = f"the ending {suffix}" if suffix else "no ending"
-        raise ClrtError(f"{fspath(path)}: a picture ends in .png or .ppm, this has {found}")
+        raise ClrtError(f"{fspath(path)}: a picture ends in .png, .ppm or .exr, this has {found}")
     return suffix
 
 
