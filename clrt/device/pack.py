@@ -157,7 +157,7 @@ def _frame(
         "extent": objects["extent"].max(initial=0.0), "width": camera.width, "height": camera.height,
         "object_count": len(objects), "triangle_slots": slots,
     }  # fmt: skip
-    values |= {name: value(scene) for f in features.active for name, _, value in f.frame}
+    values |= {name: value(scene) for f in features.active for name, *_, value in f.frame}
     for name, value in values.items():
         record[name] = value
     return record

@@ -1,4 +1,4 @@
-"""Pictures that are the mean of samples, in float64: antialiasing. The same random numbers as the kernels' (clrt.reference.sampler)."""
+"""Pictures that are the mean of samples, in float64: antialiasing, a lens. Random numbers are the kernels' (clrt.reference.sampler)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from clrt.reference import sampler
 from clrt.reference.tracer import render
-from clrt.scene.model import Scene
+from clrt.scene.model import Camera, Lens, Scene
 
 FloatArray = NDArray[np.float64]
 
@@ -36,7 +36,34 @@ def eye_rays(scene: Scene, sample: int, seed: int, bits: int = 32) -> tuple[Floa
     ul, ur, ll, lr = camera.corners
     direction = (1 - t) * ((1 - s) * ul + s * ur) + t * ((1 - s) * ll + s * lr)
     origin = np.broadcast_to(np.asarray(camera.eye, np.float64), direction.shape)
+    if scene.lens is not None and scene.lens.radius > 0.0:
+        u, v = (sampler.uniforms(pixel, sample, sampler.LENS + i, seed, bits) for i in (0, 1))
+        origin, direction = _through_lens(scene.lens, camera, direction, disc_points(2.0 * u - 1.0, 2.0 * v - 1.0))
     return origin, direction
+
+
+def _through_lens(lens: Lens, camera: Camera, direction: FloatArray, disc: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rays from points of the lens, disc (h, w, 2) to the right and up, to where the pinhole's rays meet the sharp plane."""
+    ul, ur, ll, lr = camera.corners
+    normal = np.cross(ur - ll, lr - ul)  # of the picture: perpendicular to both diagonals
+    distance = direction @ normal
+    right = (ur - ul) / np.linalg.norm(ur - ul)
+    right = right - normal * (right @ normal) / (normal @ normal)
+    up = np.cross(normal, right) * np.sign(distance[0, 0])
+    place = sum(disc[..., i, None] * axis * (lens.radius / np.linalg.norm(axis)) for i, axis in enumerate((right, up)))
+    sharp = direction * (lens.focus * np.linalg.norm(normal) / np.abs(distance))[..., None]
+    return np.asarray(camera.eye + place), np.asarray(sharp - place)
+
+
+def disc_points(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Points (..., 2) of the unit disc for those of the square -1 to 1: squares about the middle become circles (Shirley and Chiu 1997).
+
+    A sector's angle is 45 degrees times the shorter coordinate over the longer.
+    """
+    along, across = np.where(np.abs(x) > np.abs(y), (x, y), (y, x))
+    angle = np.divide(across, along, out=np.zeros_like(along), where=along != 0.0) * np.pi / 4.0
+    circle = along * np.array([np.cos(angle), np.sin(angle)])
+    return np.stack(np.where(np.abs(x) > np.abs(y), circle, circle[::-1]), axis=-1)
 
 
 def render_samples(scene: Scene, *, seed: int = 0, first: int = 0, bits: int = 32) -> SampledPicture:
