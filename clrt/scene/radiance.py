@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from clrt.scene.grammar import LARGEST
+from clrt.scene.grammar import LARGEST, LARGEST_SIDE
 from clrt.scene.model import FloatArray
 from clrt.scene.picture import PictureError, read_picture
 
@@ -33,9 +33,16 @@ def read_radiance(path: Path, name: str) -> FloatArray:
     return values
 
 
+def _check_size(width: int, height: int, name: str) -> None:
+    if width * height > MOST_TEXELS or max(width, height) > LARGEST_SIDE:
+        most = f"{MOST_TEXELS} in all and {LARGEST_SIDE} a side"
+        raise PictureError(f"{name} has {width} x {height} pixels; an environment has at most {most}")
+
+
 def _decoded(path: Path, name: str) -> FloatArray:
     """A picture of codes as linear numbers, by IEC 61966-2-1 (1999)."""
     texels = read_picture(path, name).texels[..., :3]
+    _check_size(texels.shape[1], texels.shape[0], name)
     code = texels / float(np.iinfo(texels.dtype).max)
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
 
@@ -68,8 +75,7 @@ def _first_line(message: str) -> str:
 
 def _channels(spec: Any, name: str) -> list[int]:
     """Places of red, green and blue among the channels; grey is all three. Raises PictureError, before any texel is read."""
-    if spec.width * spec.height > MOST_TEXELS:
-        raise PictureError(f"{name} has {spec.width} x {spec.height} pixels; an environment has at most {MOST_TEXELS}")
+    _check_size(spec.width, spec.height, name)
     if (spec.x, spec.y, spec.width, spec.height) != (spec.full_x, spec.full_y, spec.full_width, spec.full_height):
         raise PictureError(f"{name} holds {spec.width} x {spec.height} of {spec.full_width} x {spec.full_height} pixels; save it whole")
     if spec.get_int_attribute("Orientation", _UPRIGHT) != _UPRIGHT:
