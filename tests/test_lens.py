@@ -25,7 +25,8 @@ from clrt.scene.scale import scaled
 SCENE = Path(__file__).parents[1] / "scenes" / "lens.txt"
 FLAT = (
     "E 0.5 0 -1\nV 0.1 -0.1 1\nF 45\nR 24 20\nL 5 5 -5\nsun 1 1 -1\nbackground 0.2 0.3 0.5\nM 0.9 0.9 0.9 0.05 0.3 0.4 40 0\n"
-    "S 0.4 0 3 0.7\nM 1 1 0.5 0.1 0.9 0.3 20 0\nT -9 -1 12 9 -1 12 0 -1 -3\nT -1 -1 2 0 1 3 -1 1 4  -0.3 0 -1  0 0 -1  0 0.3 -1\nlens 0.1 3\n"
+    "S 0.4 0 3 0.7\nM 1 1 0.5 0.1 0.9 0.3 20 0\nT -9 -1 12 9 -1 12 0 -1 -3\n"
+    "T -1 -1 2 0 1 3 -1 1 4  -0.3 0 -1  0 0 -1  0 0.3 -1\nlens 0.1 3\n"
 )
 BOUNCING = FLAT.replace("40 0\n", "40 0.6\n") + "M 1 1 1 0 0.1 0.5 60 0.1 0.8 1.5\nS -0.6 0 2.5 0.6\n"
 OBLIQUE = re.sub("V.*\nF.*\n", "O -1 1 2  1.5 1.2 1.5  -1 -1 2  1.5 -0.8 1.5\n", BOUNCING)
