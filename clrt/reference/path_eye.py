@@ -38,9 +38,10 @@ def eye_rays(world: PathWorld, pixel: IndexArray, rng: Generator) -> Wave:
 
 
 def _axes(camera: Camera) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Unit (3,): the view, to the middle of the picture's corners; and two vectors that span the plane across it."""
-    view = camera.corners.sum(axis=0)
-    view = view / np.linalg.norm(view)
+    """Unit (3,): the view, perpendicular to both diagonals of the picture; and two vectors that span the plane across it."""
+    ul, ur, ll, lr = camera.corners
+    view = np.cross(lr - ul, ur - ll)
+    view = view / np.linalg.norm(view) * np.sign(view @ camera.corners.sum(axis=0))
     right = np.cross(np.eye(3)[np.abs(view).argmin()], view)
     right = right / np.linalg.norm(right)
     return view, right, np.cross(view, right)

@@ -20,6 +20,8 @@ IndexArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 Generator = np.random.Generator
 
+LEAST_ALPHA = 1e-4  #: of facets; a surface is no smoother
+
 
 @dataclass(frozen=True, eq=False)
 class PathWorld:
@@ -29,6 +31,7 @@ class PathWorld:
     duals : (n, 2, 3) g1, g2 in the plane of each triangle, so that (p - v0) . g1 and (p - v0) . g2 are the barycentric weights of
         corners 1 and 2 of a point p of it; zero where the area is zero
     emission : (n + k, 3) radiance of each primitive; area : (n + k,) its area
+    metal_rough, metallic, gloss, alpha : (materials,) alpha is that of the facets of metal-rough materials and of those with gloss
     rank, absorption : of objects, see media.ranks and media.absorption
     first : the media around the eye, as of one ray
     """
@@ -40,6 +43,10 @@ class PathWorld:
     duals: FloatArray
     emission: FloatArray
     area: FloatArray
+    metal_rough: BoolArray
+    metallic: FloatArray
+    gloss: FloatArray
+    alpha: FloatArray
     rank: IndexArray
     absorption: FloatArray
     first: MediumStack
@@ -59,13 +66,23 @@ class PathWorld:
         rank = media.ranks(prims, materials)
         # Without depth no light goes through glass, and media are not followed.
         absorption = media.absorption(prims, materials) * (scene.depth > 0)
+        metal_rough = np.array([m.metal_rough for m in scene.materials], np.bool_)
+        metallic, gloss, roughness = (np.array([getattr(m, name) for m in scene.materials], np.float64)
+                                      for name in ("metallic", "gloss", "roughness"))  # fmt: skip
+        alpha = np.maximum(np.where(metal_rough, roughness, gloss) ** 2, LEAST_ALPHA)
         return cls(scene, prims, materials, motion, duals, emission, np.concatenate([area, 4.0 * np.pi * prims.radii**2]),
-                   rank, absorption, _around_eye(scene, prims, materials, rank))  # fmt: skip
+                   metal_rough, metallic, gloss, alpha, rank, absorption, _around_eye(scene, prims, materials, rank))  # fmt: skip
 
     @property
     def emitters(self) -> IndexArray:
         """Primitives that send out light."""
         return np.flatnonzero((self.emission > 0.0).any(axis=1) & (self.area > 0.0))
+
+    @property
+    def scatters(self) -> BoolArray:
+        """(materials,) whether there is a lobe for indirect light."""
+        phong = (self.materials.diffuse > 0.0) | (self.materials.specular > 0.0)
+        return np.where(self.metal_rough, self.metallic < 1.0, phong)
 
     @property
     def walls_may_coincide(self) -> bool:

@@ -14,16 +14,13 @@ from numpy.typing import NDArray
 
 from clrt.errors import LimitError
 from clrt.reference import media
-from clrt.reference.bounce import MediumStack, Walls, bounces
-from clrt.reference.crossings import Rays
-from clrt.reference.lines import TILE_BYTES
+from clrt.reference.environment import radiance
+from clrt.reference.path_bounce import next_rays
 from clrt.reference.path_eye import eye_rays
 from clrt.reference.path_fog import fogged
 from clrt.reference.path_hits import closest, surfaces_met
-from clrt.reference.environment import radiance
-from clrt.reference.path_surfaces import direct, scattered
+from clrt.reference.path_surfaces import direct
 from clrt.reference.path_world import Generator, PathWorld, Wave
-from clrt.reference.shade import Surface
 from clrt.scene.model import Scene
 
 FloatArray = NDArray[np.float64]
@@ -101,7 +98,7 @@ def _step(world: PathWorld, wave: Wave, total: FloatArray, goes_on: bool, rng: G
     if world.scene.indirect is None:
         shown += color * world.materials.ambient[surface.material][:, None]
     _add(total, wave, wave.tint * shown)
-    return _next(world, wave, surface, color, t, rng) if goes_on else wave.take(np.zeros(0, np.int64))
+    return next_rays(world, wave, surface, color, t, rng) if goes_on else wave.take(np.zeros(0, np.int64))
 
 
 def _add(total: FloatArray, wave: Wave, value: FloatArray) -> None:
@@ -115,22 +112,3 @@ def _sky(world: PathWorld, wave: Wave) -> FloatArray:
     if world.scene.environment is None:
         return np.broadcast_to(np.array(world.scene.background, np.float64), (len(wave), 3))
     return np.where(wave.drawn[:, None], 0.0, radiance(world.scene.environment, wave.direction))
-
-
-def _next(world: PathWorld, wave: Wave, surface: Surface, color: FloatArray, t: FloatArray, rng: Generator) -> Wave:
-    """Reflected and refracted rays; with indirect light, scattered ones."""
-    walls: Walls = ()
-    if world.walls_may_coincide:
-        still = Rays(wave.origin, wave.direction, wave.own, np.zeros(len(wave)), np.ones(len(wave)))
-        walls = media.walls(world.prims, world.materials, still, surface.prim, t, TILE_BYTES)
-    b = bounces(world.prims, world.materials, surface, wave.stack, world.rank, walls)
-    waves = [_sent(wave, surface, b.reflected, b.reflect_weight, wave.stack),
-             _sent(wave, surface, b.refracted, b.refract_weight, b.behind)]  # fmt: skip
-    if world.scene.indirect is not None:
-        waves.append(scattered(world, wave, surface, color, rng))
-    return Wave.join(waves)
-
-
-def _sent(wave: Wave, surface: Surface, direction: FloatArray, weight: FloatArray, stack: MediumStack) -> Wave:
-    return Wave(surface.point, direction, surface.prim, wave.tint * weight[:, None], wave.path, wave.time, stack,
-                np.zeros(len(wave), np.bool_))  # fmt: skip
