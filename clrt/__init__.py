@@ -9,7 +9,7 @@ Importing it costs nothing: NumPy, PyOpenCL and Pillow are imported by the first
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
@@ -41,19 +41,20 @@ _LAZY = {
 
 def load(
     path: str | PathLike[str], *, right_handed: bool = False, split_objects: bool = False,
-    allow_paths: Sequence[str | PathLike[str]] = (),
+    allow_paths: Sequence[str | PathLike[str]] = (), camera: int | None = None,
 ) -> Scene:  # fmt: skip
-    """Read and check a scene text.
+    """Read and check a scene text, or a glTF or GLB file.
 
     right_handed : mirror x, for files made in right-handed axes
     split_objects : make each connected component of triangles an object, where the text marks none
     allow_paths : folders, besides the scene's own, that the files it names may be in
+    camera : which of the cameras of a glTF file, from 1; the first without it
 
     Raises SceneError with one line a fault, OSError where the file cannot be read.
     """
     from clrt.scene.build import load_scene
 
-    return load_scene(path, right_handed=right_handed, split_objects=split_objects, allow_paths=allow_paths)
+    return load_scene(path, right_handed=right_handed, split_objects=split_objects, allow_paths=allow_paths, camera=camera)
 
 
 def render(
@@ -67,6 +68,7 @@ def render(
     samples: int | None = None,
     seed: int = 0,
     count: bool = False,
+    without: Iterable[str] = (),
     progress: Callable[[str, float], None] | None = None,
 ) -> Image:
     """The picture of a scene, or of a scene text; its `stats` are the figures of the run.
@@ -78,6 +80,7 @@ def render(
     samples : rays through each pixel, instead of the scene's own; 1: one, through its centre
     seed : of all random numbers, 0 to 2^32 - 1; the same seed gives the same picture
     count : count rays and tests in a second pass
+    without : names of effects to leave out, as `clrt explain` lists them, with what needs them
     progress : called with a phase and how much of it is done, 0 to 1
 
     Raises SceneError, DeviceError, LimitError; OSError where a file cannot be read.
@@ -92,7 +95,7 @@ def render(
     read_s = time.perf_counter() - start
     image = render_scene(
         loaded, size=size, tree=tree, device=device, precision=precision, depth=depth, samples=samples, seed=seed,
-        count=count, progress=progress
+        count=count, without=without, progress=progress
     )
     if image.stats is not None and loaded is not scene:
         image.stats.read_s = read_s

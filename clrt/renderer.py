@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -14,6 +15,7 @@ from clrt.device.pack import local_origin, pack
 from clrt.device.session import Buffers, Tracer, check_picture
 from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
+from clrt.features.choice import effect_names, not_called_for
 from clrt.files import atomic_write
 from clrt.image.image import Image
 from clrt.kdtree import build_tree
@@ -52,6 +54,7 @@ def render(
     samples: int | None = None,
     seed: int = 0,
     count: bool = False,
+    without: Iterable[str] = (),
     progress: Progress | None = None,
     dump_kernel: Path | None = None,
 ) -> Image:
@@ -59,14 +62,16 @@ def render(
 
     size : (width, height) in pixels; depth : reflections and refractions in a row, 0 to 128; count : run a second, counting pass
     samples : rays through each pixel, instead of the scene's own; seed : of all random numbers, 0 to 2^32 - 1
+    without : names of effects to leave out, with what needs them; a RuntimeWarning tells of one that the scene does not call for
     dump_kernel : where to write the OpenCL program. Raises DeviceError, LimitError, ClrtError, OSError.
     """
     start = time.perf_counter()
     tell = progress or (lambda phase, fraction: None)
-    scene = at_working_size(_with_sampling(_with_options(scene, size, depth), samples, seed))
+    names = effect_names(without)
+    scene = with_options(scene, size, depth, samples, seed)
     ladder, opened = rung(precision), open_device(device)
     check_picture(opened, scene.camera.width, scene.camera.height)
-    features = Features.of(scene)
+    features = _features(scene, names)
     prepared = build_trees(scene, tree, tell)
     build_end = time.perf_counter()
     buffers, tracer, source, upload_s = open_tracer(prepared, features, ladder, opened, tell)
@@ -80,8 +85,8 @@ def render(
     end = time.perf_counter()
     stats = RunStats(
         scene=scene.source, width=scene.camera.width, height=scene.camera.height, tree=tree, device=opened.info.name,
-        precision=precision, samples=scene.samples, seed=scene.seed,
-        effects=list(features.effects), objects=_object_stats(prepared), build_s=sum(prepared.tree_s),
+        precision=precision, samples=passes(scene, features), seed=scene.seed,
+        effects=list(features.effects), without=list(names), objects=_object_stats(prepared), build_s=sum(prepared.tree_s),
         upload_s=upload_s, compile_s=compile_s, render_s=end - before, total_s=end - start,
     )  # fmt: skip
     if tracer.stages is not None:
@@ -92,7 +97,24 @@ def render(
     return Image(pixels, stats)
 
 
-def _with_options(scene: Scene, size: tuple[int, int] | None, depth: int | None) -> Scene:
+def _features(scene: Scene, without: tuple[str, ...]) -> Features:
+    """What the scene calls for but these effects; warns of those that it does not call for."""
+    for name in not_called_for(without, Features.of(scene) if without else Features(())):
+        warnings.warn(f"the scene does not call for '{name}', which is to be left out; the picture is the same", RuntimeWarning, 3)
+    return Features.of(scene, without)
+
+
+def passes(scene: Scene, features: Features) -> int:
+    """How often each pixel is traced: as often as the scene asks for samples, once where nothing is sampled."""
+    return scene.samples if any(f.name == "sampling" for f in features.active) else 1
+
+
+def with_options(scene: Scene, size: tuple[int, int] | None, depth: int | None, samples: int | None, seed: int) -> Scene:
+    """The scene with what is given in place of its own, at the size that kernels work with. Raises LimitError, ClrtError."""
+    return at_working_size(_with_sampling(_with_size(scene, size, depth), samples, seed))
+
+
+def _with_size(scene: Scene, size: tuple[int, int] | None, depth: int | None) -> Scene:
     if size is not None:
         scene = scene.with_size(*size)
     if depth is not None:
@@ -134,7 +156,8 @@ def _tell_share(tell: Progress, done: float, share: float, fraction: float) -> N
     tell("trees", done + share * fraction)
 
 
-def _shape(prepared: Prepared, features: Features, shared_lights: bool) -> program.Shape:
+def program_shape(prepared: Prepared, features: Features, shared_lights: bool) -> program.Shape:
+    """The sizes that the program of these features is compiled for."""
     deepest = max((t.depth for t in prepared.trees), default=0)
     bounces = any(f.name == "bounce" for f in features.active)
     return program.Shape(program.stack_size(deepest), prepared.scene.depth if bounces else 0, shared_lights)
@@ -146,11 +169,11 @@ def open_tracer(
     """Buffers filled and program built; also its source, and the seconds of packing, upload and preparing."""
     tell("compile", 0.0)
     lanes = precision.lanes(device.info.lanes)
-    program.check_limits(precision, lanes, _shape(prepared, features, True), features)
+    program.check_limits(precision, lanes, program_shape(prepared, features, True), features)
     start = time.perf_counter()
     buffers = Buffers(device, pack(prepared.scene, prepared.trees, features, precision), features, precision)
     upload_s = time.perf_counter() - start
-    source = program.compose(features, precision, lanes, _shape(prepared, features, buffers.shared_lights))
+    source = program.compose(features, precision, lanes, program_shape(prepared, features, buffers.shared_lights))
     built = program.build(device, source)
     tracer = Tracer(buffers, built)
     tracer.warm_up()
@@ -167,13 +190,13 @@ def run_rows(tracer: Tracer, phase: str, tell: Progress) -> None:
     rays_a_pixel = (1 + len(scene.lights_with_position) + len(scene.suns)) * (1 + (2 * scene.depth if bounces else 0))
     rows = max(8, _FIRST_LAUNCH // (rays_a_pixel * tracer.width) // 8 * 8)
     sampled = "sampling" in {f.name for f in tracer.buffers.features.active}
-    passes = scene.samples if sampled else 1
-    for sample in range(passes):
+    count = passes(scene, tracer.buffers.features)
+    for sample in range(count):
         if sampled:
             tracer.begin_sample(sample)
         row = 0
         while row < tracer.height:
-            tell(phase, (sample + row / tracer.height) / passes)
+            tell(phase, (sample + row / tracer.height) / count)
             end = min(tracer.height, row + rows)
             start = time.perf_counter()
             tracer.run(row, end)
@@ -197,7 +220,7 @@ def _count(prepared: Prepared, buffers: Buffers, stats: RunStats, tell: Progress
     """The same picture again by the counting build: rays by kind, tests by object."""
     precision, device = buffers.precision, buffers.device
     lanes = precision.lanes(device.info.lanes)
-    shape = _shape(prepared, buffers.features, buffers.shared_lights)
+    shape = program_shape(prepared, buffers.features, buffers.shared_lights)
     tracer = Tracer(
         buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True
     )

@@ -49,7 +49,8 @@ class RunStats:
     ray_counts : rays traced by kind (see RAY_KINDS), None unless counted
     decided : lanes that the rung "exact" decided in float64 and in exact arithmetic; None for other rungs
     samples, seed : rays through each pixel; the seed of all random numbers
-    effects : names of what the scene calls for, in the order of their kernels
+    effects : names of what the scene calls for, in the order of their kernels, but for what was left out
+    without : names of effects that were to be left out
     """
 
     scene: str = ""
@@ -61,6 +62,7 @@ class RunStats:
     samples: int = 1
     seed: int = 0
     effects: list[str] = field(default_factory=list)
+    without: list[str] = field(default_factory=list)
     objects: list[ObjectStats] = field(default_factory=list)
     ray_counts: dict[str, int] | None = None
     decided: dict[str, int] | None = None
@@ -126,6 +128,7 @@ class RunStats:
             "samples": self.samples,
             "seed": self.seed,
             "effects": list(self.effects),
+            "without": list(self.without),
             **{name: round(getattr(self, name), 6) for name in _TIMES},
             "triangles": self.triangles,
             "nodes": self.nodes,

@@ -16,7 +16,7 @@ from clrt.bench import export, report, scenes
 from clrt.bench.marks import marks_of
 from clrt.bench.measure import whole_from_sample
 from clrt.bench.programs import absent_bytes
-from clrt.bench.timing import Series, interleave
+from clrt.timing import Series, interleave
 from clrt.bench.versus import DARK, LIT, SHADOWED, rates_of
 from clrt.device.program import Shape, compose
 from clrt.errors import ClrtError

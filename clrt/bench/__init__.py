@@ -1,7 +1,6 @@
 """The harness behind `make bench`: `python -m clrt.bench` measures, prints, and keeps the raw times as JSON.
 
     scenes.py      what is rendered: the report's scenes, or generated ones in their place
-    timing.py      contenders in turns, best and median
     machine.py     what it ran on
     peers.py       the same rays through Embree
     measure.py     trees against brute force, tests a ray, whole commands, specialised programs

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from clrt.bench.scenes import BenchScene, straight
-from clrt.bench.timing import interleave
+from clrt.timing import interleave
 from clrt.device.context import Device
 from clrt.features import Features
 from clrt.precision import RUNGS, rung

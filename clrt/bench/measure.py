@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from clrt.bench.scenes import BenchScene
-from clrt.bench.timing import Series, interleave
+from clrt.timing import Series, interleave
 from clrt.bench.versus import opened
 from clrt.device.context import Device
 from clrt.errors import ClrtError

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from clrt.bench.machine import cores
 from clrt.bench.peers import Embreex, embreex_available, primary_rays, shadow_rays
 from clrt.bench.scenes import BenchScene, straight
-from clrt.bench.timing import Series, interleave
+from clrt.timing import Series, interleave
 from clrt.device.context import Device
 from clrt.device.session import Tracer
 from clrt.features import Features

@@ -13,6 +13,9 @@ from __future__ import annotations
 import errno
 import os
 import traceback
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import click
 
@@ -43,6 +46,16 @@ def report(error: BaseException) -> int:
 
 def warn(message: str) -> None:
     streams.complain(f"clrt: warning: {message}\n")
+
+
+@contextmanager
+def warnings_told() -> Iterator[None]:
+    """What is warned of within is printed after it, a line each."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RuntimeWarning)
+        yield
+    for warning in caught:
+        warn(str(warning.message))
 
 
 def _message(error: BaseException) -> str | None:

@@ -15,13 +15,14 @@ from clrt.cli import failure, streams
 from clrt.cli.paths import DEFAULT_SCENE
 
 #: a command and the module that has it, in the order of the help; imported when called for, so that `clrt --help` is quick
-_COMMANDS = {"render": "render", "devices": "devices", "verify": "verify", "convert": "scenes", "make": "scenes"}
+_COMMANDS = {"render": "render", "explain": "explain", "devices": "devices", "verify": "verify", "convert": "scenes", "make": "scenes"}
 
 _HELP = """Render a scene text to a picture.
 
     \b
     clrt scene.txt                     writes scene.png into the current folder
     clrt scene.txt -o picture.ppm --size 640x480
+    clrt model.glb --size 800x600      a glTF scene, with its own cameras and lights
     clrt ./devices                     a scene that is called like a command
 
 Without any argument, input.txt of the current folder is rendered. Exit codes: 0 done, 1 a fault of clrt, 2 something to mend,

@@ -12,8 +12,8 @@ from clrt.files import check_writable
 
 DEFAULT_SCENE = "input.txt"  #: rendered where no scene is given
 
-_COMMANDS = ("devices", "convert", "make", "render")
-_MESHES = {".obj", ".ply", ".stl", ".off", ".gltf", ".glb"}
+_COMMANDS = ("devices", "explain", "convert", "make", "render")
+_MESHES = {".obj", ".ply", ".stl", ".off"}  #: not scenes by themselves, as .gltf and .glb are
 
 
 def check_scene(path: Path) -> None:
@@ -24,7 +24,7 @@ def check_scene(path: Path) -> None:
             raise ClrtError(f"no command and no file is called {path}; did you mean `clrt {near[0]}`?")
     check_input(path)
     if path.suffix.lower() in _MESHES:
-        raise ClrtError(f"{path}: this is a mesh; `clrt convert {path} scene.txt` makes a scene of it")
+        raise ClrtError(f"{path}: this is a mesh; `clrt convert {path} scene.txt` makes a scene of it, the line \"mesh {path.name}\" puts it into one")
 
 
 def check_input(path: Path) -> None:

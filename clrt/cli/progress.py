@@ -18,6 +18,7 @@ _PATIENCE_S = 1.0  #: what is done sooner shows nothing
 _WORDS = {
     "read": "reading the scene", "trees": "building the trees", "compile": "compiling the kernels", "render": "rendering",
     "count": "counting rays and tests", "write": "writing the picture", "convert": "converting", "make": "making",
+    "explain": "composing without each effect", "measure": "measuring each effect",
 }  # fmt: skip
 _AT_ONCE = {"compile"}
 

@@ -58,6 +58,11 @@ class Buffers:
         if with_shadows:
             self.effects["light_planes"] = self.empty(self.plane_bytes * (lights if self.shared_lights else 1))
 
+    @property
+    def size(self) -> int:
+        """Bytes of all buffers: the scene's, and those of effects."""
+        return sum(b.size for b in (self.frame, self.vertices, self.triangles, self.eye_planes, *self.core, *self.effects.values()))
+
     def _check_memory(self) -> None:
         need, there = self.plane_bytes * 4, self.device.handle.global_mem_size
         if need > there:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,3 +49,21 @@ def interleave(
             if turn >= warm_ups:
                 taken[name].append(seconds)
     return {name: Series(tuple(seconds)) for name, seconds in taken.items()}
+
+
+FEWEST = 6  #: values that bound their median at all, at 95%
+
+
+def median_interval(values: Sequence[float], level: float = 0.95) -> tuple[float, float]:
+    """An interval that holds the median of what `values` were drawn from with a probability of `level` or more.
+
+    Between the k-th least and the k-th greatest value, where the median is unless fewer than k of n values fall on one side of it, by a
+    binomial law whatever the distribution (David and Nagaraja 2003, 7.1). Raises ValueError for too few values, as are 5 at 95%.
+    """
+    ordered, count = sorted(values), len(values)
+    tail, k = 0.0, 0
+    while 2.0 * (tail := tail + math.comb(count, k) / 2.0**count) <= 1.0 - level and k < count // 2:
+        k += 1
+    if k == 0:
+        raise ValueError(f"{count} values do not bound their median at a level of {level:g}; take {FEWEST} or more")
+    return ordered[k - 1], ordered[count - k]
