@@ -73,7 +73,10 @@ static __attribute__((noinline)) void arealight_draw(global const Emitter *emitt
         }
         // A light seen edge-on, or from where it stands, gives nothing.
         if (!(square > R(0.0)) || !(cosine > AREALIGHT_LEAST_COS)) chance[k] = R(0.0);
-        slack[k] = emitter->bound / max(cosine, AREALIGHT_LEAST_COS);
+        // Off by `bound` across the light, the point is off by that over the cosine along the way. Where a way meets a sphere is known no better
+        // than the discriminant, to 16u r d (sphere.cl), which is 8u d over the cosine.
+        const real across = emitter->bound + (emitter->radius > R(0.0) ? R(32.0) * UNIT_ROUNDOFF * sqrt(square) : R(0.0));
+        slack[k] = across / max(cosine, AREALIGHT_LEAST_COS);
         for (int a = 0; a < 3; a++) {
             point[a * LANES + k] = at[a];
             radiance[a * LANES + k] = emitter->radiance[a];

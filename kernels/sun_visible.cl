@@ -1,4 +1,4 @@
-// Provides: the shadows of suns.
+// Provides: what stands between hits and suns.
 // Needs: sun.cl, reach.cl.  Reads: nothing.
 
 //@hook sun_visible
