@@ -10,5 +10,5 @@ HOT void globe_place(global const Sphere *sphere, const double *point, double *u
 }
 
 //@hook texture_place
-        if (slot[k] >= geometry->slot_count) globe_place(geometry->spheres + (slot[k] - geometry->slot_count), point, uv);
+    if (slot >= geometry->slot_count) globe_place(geometry->spheres + (slot - geometry->slot_count), point, uv);
 //@end

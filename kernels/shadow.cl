@@ -37,6 +37,7 @@ HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int i
     //@ shadow_limit
     scene_trace(&seen, &rays, SHADOW_SHARED_ORIGIN, 1, &hits);
     //@counting count_rays(geometry->counters, COUNT_SHADOW, rays.active);
+    //@ shadow_blocked
     return lit & is_less(hits.slot, NO_LANES);
 }
 

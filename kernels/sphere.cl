@@ -45,6 +45,7 @@ static __attribute__((noinline)) mask_n sphere_double(global const Sphere *spher
 // (t = -2 f.d, inwards). A ray that ends on it (any_hit) leaves out the root at its end, and may meet the other: the far wall,
 // where the end is seen from inside.
 HOT void sphere_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
+    //@ sphere_begin
     for (int i = 0; i < geometry->sphere_count; i++) {
         global const Sphere *sphere = geometry->spheres + i;
         const mask_n own = is_equal(rays->skip, (mask_n)(geometry->slot_count + i));

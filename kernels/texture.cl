@@ -1,5 +1,5 @@
-// Provides: texture_tints: the colours of pictures at the hits.
-// Needs: hit.cl, geometry.cl, structs.  Reads: nothing.
+// Provides: texture_color: the colour of a picture at its coordinates; texture_coordinates: those of a point on a primitive.
+// Needs: geometry.cl, structs.  Reads: nothing.
 //
 // Coordinates are computed in float64 from the given corners and the hit point, which is off by its own error alone: a coordinate repeated a
 // thousand times keeps its digits. Colours are decoded before they are mixed.
@@ -29,18 +29,23 @@ HOT real texture_value(global const Texture *texture, global const uchar *texels
     return texel_values[texture->values + (texture->code_bytes == 1 ? from[code] : ((global const ushort *)from)[code])];
 }
 
-// The picture's colour at (u, v); v = 0 is the lower edge, row 0 the upper one.
-HOT void texture_color(global const Texture *texture, global const uchar *texels, global const real *texel_values, double u, double v, real *color) {
+// The texels around (u, v), columns first, and how far the point lies towards the second ones; v = 0 is the lower edge, row 0 the upper one.
+HOT void texture_around(global const Texture *texture, double u, double v, int *first, int *second, real *part) {
     const double at[2] = {texture_reduced(u, texture->wrap) * texture->width, texture_reduced(1 - v, texture->wrap) * texture->height};
     const int size[2] = {texture->width, texture->height};
-    int first[2], second[2];
-    real part[2];
     for (int a = 0; a < 2; a++) {
         const double place = texture->linear ? at[a] - 0.5 : at[a], low = floor(place);
         first[a] = texture_wrapped((int)low, size[a], texture->wrap);
         second[a] = texture_wrapped((int)low + 1, size[a], texture->wrap);
         part[a] = texture->linear ? (real)(place - low) : R(0.0);
     }
+}
+
+// The picture's colour at (u, v).
+HOT void texture_color(global const Texture *texture, global const uchar *texels, global const real *texel_values, double u, double v, real *color) {
+    int first[2], second[2];
+    real part[2];
+    texture_around(texture, u, v, first, second, part);
     for (int channel = 0; channel < 3; channel++) {
         const real upper = (R(1.0) - part[0]) * texture_value(texture, texels, texel_values, first[0], first[1], channel) +
                            part[0] * texture_value(texture, texels, texel_values, second[0], first[1], channel);
@@ -68,45 +73,8 @@ HOT void texture_on_triangle(const Geometry *geometry, global const double *corn
     for (int i = 0; i < 2; i++) uv[i] = corner[i] + second * (corner[2 + i] - corner[i]) + third * (corner[4 + i] - corner[i]);
 }
 
-// What the pictures multiply the materials' colours by; 1 where there is none. `where` holds the points, three times LANES.
-static __attribute__((noinline)) void texture_lanes(const Geometry *geometry, global const Material *materials, global const Texture *textures,
-                                                    global const uchar *texels, global const real *texel_values,
-                                                    global const double *corner_uvs, const lane_int *found, const lane_int *slot,
-                                                    const lane_int *material, const real *where, real *tint) {
-    for (int k = 0; k < LANES; k++) {
-        const int texture = materials[material[k]].texture;
-        for (int a = 0; a < 3; a++) tint[a * LANES + k] = R(1.0);
-        if (!found[k] || texture < 0) continue;
-        double point[3], uv[2] = {0, 0};
-        for (int a = 0; a < 3; a++) point[a] = where[a * LANES + k];
-        if (slot[k] < geometry->slot_count) texture_on_triangle(geometry, corner_uvs, (int)slot[k], point, uv);
-        //@ texture_place
-        real color[3];
-        texture_color(textures + texture, texels, texel_values, uv[0], uv[1], color);
-        for (int a = 0; a < 3; a++) tint[a * LANES + k] = color[a];
-    }
+// The same at a point of any primitive.
+HOT void texture_coordinates(const Geometry *geometry, global const double *corner_uvs, int slot, const double *point, double *uv) {
+    if (slot < geometry->slot_count) texture_on_triangle(geometry, corner_uvs, slot, point, uv);
+    //@ texture_place
 }
-
-HOT void texture_tints(const Geometry *geometry, global const Material *materials, global const Texture *textures, global const uchar *texels,
-                       global const real *texel_values, global const double *corner_uvs, const Hit *hit, real_n *tint) {
-    // Copies go to the function: what it is given by pointer could not stay in registers here.
-    const Geometry seen = *geometry;
-    lane_int found[LANES], slot[LANES], material[LANES];
-    real where[3 * LANES], color[3 * LANES];
-    store_lanes(hit->found, found);
-    for (int k = 0; k < LANES; k++) {
-        slot[k] = hit->slot[k];
-        material[k] = hit->material[k];
-    }
-    for (int a = 0; a < 3; a++) store_lanes(hit->point[a], where + a * LANES);
-    texture_lanes(&seen, materials, textures, texels, texel_values, corner_uvs, found, slot, material, where, color);
-    for (int a = 0; a < 3; a++) tint[a] = load_lanes(color + a * LANES);
-}
-
-//@hook light
-        real_n tint[3];
-        texture_tints(&geometry, materials, textures, texels, texel_values, corner_uvs, &hit, tint);
-//@end
-//@hook albedo
-            albedo *= tint[a];
-//@end

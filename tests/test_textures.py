@@ -216,7 +216,7 @@ def bad(tmp_path: Path) -> Path:
         ("texture /etc/passwd", "7:9: error: /etc/passwd leads out of the scene's folder"),
         ("texture whole.png wrap=klamp", '7:24: error: wrap must be repeat, clamp or mirror, found "klamp"; did you mean "clamp"?'),
         ("texture whole.png filter=2", '7:26: error: filter must be linear or nearest, found "2"'),
-        ("texture whole.png gamma=2", '7:19: error: texture has no key "gamma" (its keys: wrap, filter, srgb)'),
+        ("texture whole.png gamma=2", '7:19: error: texture has no key "gamma" (its keys: wrap, filter, srgb, alpha, cutoff)'),
         ("texture", '7:1: error: texture takes 1 value, as in "texture wood.png wrap=mirror", found 0'),
         ("texture whole.png\ntexture whole.png", "8:1: error: a second texture line for the material of line 6; the first is line 7"),
         ("texture whole.png\nT 0 0 2 1 0 2 0 1 2", "7:1: error: the triangle of line 8 has no place on the picture; add a line such as"),

@@ -35,7 +35,7 @@ _TREES = ("box.cl", "kdtree.cl")
 #: entry point -> files before effects that the traversal calls, between those and other effects, after all
 _ENTRIES = {
     "render": (("hit.cl",), ("scene.cl", "surface.cl"), ("camera.cl", "prepare.cl", "render.cl")),
-    "cast": ((), ("scene.cl",), ("prepare.cl", "cast.cl", "cast_finish.cl")),
+    "cast": ((), ("scene.cl",), ("after.cl", "prepare.cl", "cast.cl", "cast_finish.cl")),
 }
 PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a packet, width and height
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
@@ -191,7 +191,8 @@ def private_bytes(precision: Precision, lanes: int, shape: Shape, features: Feat
     lane_bytes = lanes * precision.bits // 8
     names = {f.name for f in features.active}
     entry = lane_bytes * (9 + (2 * MEDIA_DEPTH + 1 if "refraction" in names else 0) + (3 if "absorption" in names else 0)) + 64
-    copies = 1 + sum(name in names for name in ("bounce", "shadows", "sun shadows", "refraction"))  # refraction: for coincident walls
+    # Refraction: for coincident walls.
+    copies = 1 + sum(name in names for name in ("bounce", "shadows", "sun shadows", "opacity shadows", "refraction"))
     traversal = shape.stack * (2 * lane_bytes + 4) * copies
     return traversal + (entry * (bounce_stack(features, shape.depth) + 2) if "bounce" in names else 0) + (16 << 10)
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from clrt.features import camera, helpers, lamps, sampled, shapes, surfaces, surroundings
+from clrt.features import camera, cutouts, helpers, lamps, rough, sampled, shapes, surfaces, surroundings
 from clrt.features.feature import REAL, Calls, Feature
 from clrt.scene.model import Scene
 
@@ -28,6 +28,15 @@ FEATURES: tuple[Feature, ...] = (
     helpers.PATH,
     shapes.SPHERES,
     shapes.SMOOTH,
+    cutouts.GLOBE,
+    cutouts.PICTURES,
+    cutouts.NORMAL_GLOBE,
+    cutouts.NORMAL_MAP,
+    cutouts.OPACITY,
+    cutouts.ALPHA,
+    cutouts.OPACITY_SPHERE,
+    cutouts.AFTER,
+    cutouts.OPACITY_SHADOWS,
     lamps.SHADOWS,
     lamps.DIRECT_LIGHT,
     lamps.SPOT,
@@ -35,10 +44,16 @@ FEATURES: tuple[Feature, ...] = (
     helpers.REACH,
     lamps.SUN_SHADOWS,
     lamps.SUN,
+    helpers.FACETS,
+    rough.GLOSS,
     surfaces.FRESNEL,
     surfaces.REFRACTION,
     surfaces.ABSORPTION,
     surfaces.MIRROR,
+    rough.GLOSS_MIRROR,
+    rough.GLOSS_FRESNEL,
+    rough.GLOSS_GLASS,
+    cutouts.OPACITY_SEEN,
     helpers.BOUNCE,
     helpers.PATH_BOUNCE,
     helpers.ADDED,
@@ -48,6 +63,7 @@ FEATURES: tuple[Feature, ...] = (
     sampled.INDIRECT,
     sampled.CLAMP,
     helpers.SCATTER,
+    helpers.GLOSS_LIGHT,
     surroundings.ENVIRONMENT_LIGHT,
     surroundings.ENVIRONMENT_SHADOWS,
     helpers.ENVIRONMENT_MIS,
@@ -55,7 +71,6 @@ FEATURES: tuple[Feature, ...] = (
     sampled.AREA_SHADOWS,
     helpers.AREA_MIS,
     helpers.AREA_SPHERE,
-    helpers.GLOBE,
     surfaces.TEXTURES,
 )
 HELPERS = frozenset(f.name for f in FEATURES if f.helper)  #: parts that effects share; not effects of their own

@@ -22,12 +22,6 @@ def _texture_caller(scene: Scene) -> int | None:
     return min((scene.textures[m.texture].line for m in used_materials(scene) if m.texture >= 0), default=None)
 
 
-def globe_caller(scene: Scene) -> int | None:
-    """A picture on a round primitive."""
-    used = np.unique(scene.spheres.material_ids).tolist()
-    return min((scene.textures[t].line for i in used if (t := scene.materials[i].texture) >= 0), default=None)
-
-
 REFRACTION = Feature(
     "refraction",
     material_caller("refract"),
@@ -49,12 +43,6 @@ MIRROR = Feature("mirror", material_caller("reflect"), "mirror.cl", material=(("
 TEXTURES = Feature(
     "textures",
     _texture_caller,
-    "texture.cl",
+    "texture_tint.cl",
     material=(("texture", np.int32),),
-    parameters=(
-        ("textures", "global const Texture *textures"),
-        ("texels", "global const uchar *texels"),
-        ("texel_values", "global const real *texel_values"),
-        ("corner_uvs", "global const double *corner_uvs"),
-    ),
 )

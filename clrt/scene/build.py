@@ -11,12 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
+from clrt.errors import SceneError
 from clrt.scene.camera import build_camera
 from clrt.scene.environment import read_environment
 from clrt.scene.faults import Faults
 from clrt.scene.grammar import LETTERS
 from clrt.scene.instances import build_instances, splits
 from clrt.scene.model import Instance, Material, MeshObject, PointLight, Scene, Spheres
+from clrt.scene.models.direct import is_model, load_model_scene
 from clrt.scene.objects import build_objects, material_of
 from clrt.scene.picture import Folders
 from clrt.scene.text import Declarations, read_declarations, read_file
@@ -29,16 +31,24 @@ _ANYTHING = re.compile(r"[^\s\ufeff]")
 
 def load_scene(
     path: str | PathLike[str], *, right_handed: bool = False, split_objects: bool = False,
-    allow_paths: Sequence[str | PathLike[str]] = (),
+    allow_paths: Sequence[str | PathLike[str]] = (), camera: int | None = None,
 ) -> Scene:  # fmt: skip
-    """Read and check the scene text of a file.
+    """Read and check the scene text of a file, or the scene of a glTF or GLB file.
 
     right_handed : mirror x, for files made in right-handed axes
     split_objects : make each connected component of triangles an object, where no O line closes one
     allow_paths : folders, besides the scene's own, that the files it names may be in
+    camera : which of the cameras of a glTF file, from 1; the first without it
 
     Raises SceneError with one `file:line:column: error: ...` line a fault, also where the file cannot be read.
     """
+    if is_model(Path(path)):
+        for given, option in ((right_handed, "--right-handed"), (split_objects, "--split-objects")):
+            if given:
+                raise SceneError(f"{path}: error: {option} is for scene texts; axes and objects of a glTF file are known, leave it out")
+        return load_model_scene(Path(path), camera=camera, allow_paths=[Path(p) for p in allow_paths])
+    if camera is not None:
+        raise SceneError(f"{path}: error: --camera chooses among the cameras of a glTF file; a scene text has one, leave it out")
     folders = Folders(Path(path).parent, [Path(p) for p in allow_paths])
     return parse_scene(read_file(Path(path)), str(path), right_handed=right_handed, split_objects=split_objects, folders=folders)
 
@@ -122,6 +132,7 @@ def _check_material_words(found: Declarations, faults: Faults) -> None:
     """Words of a material stand below one, each once a material; those of glass below one with Refract > 0."""
     materials, glass = found.lines_of("M").tolist(), found.get("M", 10)
     refract = dict(zip(glass.lines.tolist(), glass.values[:, 8].tolist(), strict=True)) | dict.fromkeys(found.broken.get("M", []), 1.0)
+    shiny = {line for line, values in _in_order(found, "M") if max(values[7:9]) > 0.0} | {*found.broken.get("M", [])}
     first: dict[tuple[str, int], int] = {}
     for call in (c for c in found.words if WORDS[c.name].of):
         word = WORDS[call.name]
@@ -132,6 +143,8 @@ def _check_material_words(found: Declarations, faults: Faults) -> None:
             fault = f'{call.name} before any material; add {what} above it, such as "{such}"'
         elif word.of == "glass" and not refract.get(material, 0.0) > 0.0:
             fault = f"{call.name} needs a material that light passes through; give the M of line {material} 10 numbers, Refract above 0"
+        elif word.of == "shiny" and material not in shiny:
+            fault = f"{call.name} needs a mirror or glass to make rough; give the M of line {material} a Reflect or a Refract above 0"
         elif word.once and (call.name, material) in first:
             fault = f"a second {call.name} of one material; the first is line {first[call.name, material]}, remove one of the two"
         else:

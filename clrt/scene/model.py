@@ -87,6 +87,7 @@ class Material:
     metal_rough : the material is a metal-rough one as in glTF 2.0, of base colour `color`; `metallic` and `roughness` from 0 to 1;
         `metal_rough_line` asks for it
     metal_rough_map, emission_map : indices into Scene.textures, -1 for none: roughness in green and metallic in blue; colour of emission
+    alpha : the alpha of the picture `texture` multiplies the opacity
     alpha_cutoff : a picture's alpha below this is a hole, at or above it is none; 0: alpha is the surface's own opacity
     """
 
@@ -120,6 +121,22 @@ class Material:
     metal_rough_map: int = -1
     emission_map: int = -1
     alpha_cutoff: float = 0.0
+    alpha: bool = False
+
+    @property
+    def alpha_texture(self) -> int:
+        """Index into Scene.textures of the picture whose alpha counts, -1 for none."""
+        return self.texture if self.alpha else -1
+
+    @property
+    def translucent(self) -> bool:
+        """Whether some of the light may pass straight through."""
+        return self.opacity < 1.0 or self.alpha_texture >= 0
+
+    @property
+    def opacity_seen(self) -> bool:
+        """Whether its opacity holds for what is seen, not for shadows alone."""
+        return self.opacity_of == "all"
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,6 +267,7 @@ class MeshObject:
     line : the line that calls for smooth normals (0: none)
     uvs : (n, 3, 2) float64 texture coordinates a corner, or None where no triangle of the scene has any
     motion : scene units that the object moves a unit of time; `motion_line` asks for it
+    hidden : the object itself is not there, only its instances are
     """
 
     vertices: FloatArray
@@ -262,6 +280,7 @@ class MeshObject:
     uvs: FloatArray | None = None
     motion: tuple[float, float, float] = (0.0, 0.0, 0.0)
     motion_line: int = 0
+    hidden: bool = False
 
     def __len__(self) -> int:
         return len(self.vertices)
@@ -281,6 +300,22 @@ class Spheres:
 
     def __len__(self) -> int:
         return len(self.radii)
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """An object once more, elsewhere.
+
+    object : index into Scene.objects
+    world_from_object : (3, 4) float64, the point p of the object lies at world_from_object[:, :3] @ p + world_from_object[:, 3];
+        of positive determinant; where the object has normals at corners, turns, shifts and one scale for all axes alone
+    line : where the scene text asks for it (0: not from a text)
+    """
+
+    object: int
+    world_from_object: FloatArray
+    line: int = 0
+    name: str = "instance"
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,6 +348,7 @@ class Scene:
     shutter: Shutter | None = None
     fog: Fog | None = None
     indirect: Indirect | None = None
+    instances: tuple[Instance, ...] = ()
 
     @property
     def triangle_count(self) -> int:

@@ -1,6 +1,6 @@
-"""The words `texture`, `uv` and `project`: pictures on materials, and where on them the corners of triangles lie.
+"""The words `texture`, `normalmap`, `uv` and `project`: pictures on materials, and where on them the corners of triangles lie.
 
-`texture` and `project` hold for the material (M) above them, `uv` for the triangle (T) above it.
+`texture`, `normalmap` and `project` hold for the material (M) above them, `uv` for the triangle (T) above it.
 """
 
 from __future__ import annotations
@@ -8,50 +8,83 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clrt.scene.faults import Faults
-from clrt.scene.model import FloatArray, Material, Picture, Texture
+from clrt.scene.model import FloatArray, Material, MeshObject, Picture, Texture
 from clrt.scene.objects import gather, material_of
 from clrt.scene.picture import Folders, PictureError, read_picture
 from clrt.scene.text import Declarations
 from clrt.scene.words.word import WordCall
 
+LEAST_TURN = 2.0**-40  #: sine of the angle between two sides on the picture up to which they lie on a line
 #: axis that is looked along -> the axes that u and v follow
 _PLANES = {"x": (2, 1), "y": (0, 2), "z": (0, 1)}
 
 
 @dataclass(frozen=True, eq=False)
 class Textured:
-    """What the three words add: the textures, material index -> texture, and uvs (n, 3, 2) of all triangles in the order of their lines."""
+    """What the words add: the textures; what of each material they set, by its index; uvs (n, 3, 2) of all triangles in the order of their
+    lines."""
 
     textures: tuple[Texture, ...]
-    of_material: dict[int, int]
+    of_material: dict[int, dict[str, Any]]
     uvs: FloatArray | None
 
     def materials(self, plain: Sequence[Material]) -> list[Material]:
-        """The materials with their textures."""
-        return [replace(m, texture=self.of_material.get(i, -1)) for i, m in enumerate(plain)]
+        """The materials with their pictures."""
+        return [replace(m, **self.of_material.get(i, {})) for i, m in enumerate(plain)]
 
 
 def read_textures(found: Declarations, folders: Folders, faults: Faults) -> Textured:
-    """Check the lines of the three words, and read the pictures; what is wrong is noted."""
-    if not any(call.name in ("texture", "uv", "project") for call in found.words):
+    """Check the lines of these words, and read the pictures; what is wrong is noted."""
+    if not any(call.name in ("texture", "normalmap", "uv", "project") for call in found.words):
         return Textured((), {}, None)
-    calls = _by_material(found, "texture", faults)
+    colors, normals = _by_material(found, "texture", faults), _by_material(found, "normalmap", faults)
     projections = _by_material(found, "project", faults)
     for material, call in projections.items():
-        if material not in calls:
+        if material not in colors and material not in normals:
             faults.add(call.line, call.column, "project has no effect on a material without a texture; add a line texture above it")
-    textures, pictures = [], dict[Path, "Picture | None"]()
-    for call in calls.values():
+    textures: list[Texture] = []
+    pictures: dict[Path, Picture | None] = {}
+    of_material: dict[int, dict[str, Any]] = {}
+    for material, call in (*colors.items(), *normals.items()):
         picture = _picture(call, folders, pictures, faults)
         if picture is not None:
-            textures.append(Texture(picture, call.text("wrap"), call.text("filter") == "linear", call.text("srgb") == "yes", call.line))
+            of_material.setdefault(material, {}).update(_looks(call, len(textures)))
+            srgb = call.name == "texture" and call.text("srgb") == "yes"
+            textures.append(Texture(picture, call.text("wrap"), call.text("filter") == "linear", srgb, call.line))
+    calls = {**normals, **colors}
     uvs = _coordinates(found, calls, projections, faults)
-    return Textured(tuple(textures), {material: i for i, material in enumerate(calls)}, uvs if calls else None)
+    return Textured(tuple(textures), of_material, uvs if calls else None)
+
+
+def _looks(call: WordCall, texture: int) -> dict[str, Any]:
+    """What a line with a picture sets of its material."""
+    if call.name == "normalmap":
+        return {"normal_map": texture, "normal_strength": call.number("strength")}
+    return {"texture": texture, "alpha": call.text("alpha") == "yes", "alpha_cutoff": call.number("cutoff")}
+
+
+def untilted(objects: Sequence[MeshObject], materials: Sequence[Material]) -> list[str]:
+    """The warning of triangles with a normal map whose places on it lie on a line: their normals are not tilted."""
+    mapped = np.array([m.normal_map >= 0 for m in materials], np.bool_)
+    count, first = 0, -1
+    for item in objects:
+        if item.uvs is None:
+            continue
+        a, b = item.uvs[:, 1] - item.uvs[:, 0], item.uvs[:, 2] - item.uvs[:, 0]
+        area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+        rows = np.flatnonzero(mapped[item.material_ids] & ~(area > LEAST_TURN * np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)))
+        first = item.first_prim + int(rows[0]) if len(rows) and first < 0 else first
+        count += len(rows)
+    if not count:
+        return []
+    which = f"triangle {first}" if count == 1 else f"{count} triangles (the first: triangle {first})"
+    return [f"{which}: the corners lie on a line of the normal map; normals are not tilted there"]
 
 
 def _by_material(found: Declarations, word: str, faults: Faults) -> dict[int, WordCall]:

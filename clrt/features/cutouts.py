@@ -1,0 +1,80 @@
+"""Light that passes straight through: opacity, alpha of pictures, their shadows. And what pictures do besides colour: normal maps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from clrt.features import lamps, sampled, shapes, surfaces, surroundings
+from clrt.features.feature import REAL, Caller, Feature, Joint, used_materials
+from clrt.scene.model import Material, Scene
+
+
+def _opacity_line(scene: Scene, material: Material) -> int:
+    return material.opacity_line if material.opacity < 1.0 else scene.textures[material.alpha_texture].line
+
+
+def _opacity_caller(scene: Scene) -> int | None:
+    return min((_opacity_line(scene, m) for m in used_materials(scene) if m.translucent), default=None)
+
+
+def _seen_caller(scene: Scene) -> int | None:
+    return min((_opacity_line(scene, m) for m in used_materials(scene) if m.translucent and m.opacity_seen), default=None)
+
+
+def _map_caller(attribute: str) -> Caller:
+    """The first used material with a picture for `attribute`."""
+
+    def called_by(scene: Scene) -> int | None:
+        numbers = (getattr(m, attribute) for m in used_materials(scene))
+        return min((scene.textures[i].line for i in numbers if i >= 0), default=None)
+
+    return called_by
+
+
+def _round_picture_caller(scene: Scene) -> int | None:
+    """A picture on a round primitive."""
+    used = [scene.materials[i] for i in np.unique(scene.spheres.material_ids).tolist()]
+    numbers = {i for m in used for i in (m.texture, m.normal_map, m.metal_rough_map, m.emission_map) if i >= 0}
+    return min((scene.textures[i].line for i in numbers), default=None)
+
+
+#: surfaces that let light pass: how much
+OPACITY = Feature("opacity", _opacity_caller, "opaque.cl", material=(("opacity", REAL),))
+#: what is seen of them, and behind them
+OPACITY_SEEN = Feature(
+    "opacity seen", _seen_caller, "opacity.cl", material=(("opacity_seen", np.int32),), rays=("passed",), branches=1, needs=(OPACITY,),
+    helper=True,
+)  # fmt: skip
+OPACITY_SHADOWS = Feature(
+    "opacity shadows",
+    Joint((OPACITY, Joint((lamps.SHADOWS, lamps.SUN_SHADOWS, sampled.AREA_SHADOWS, surroundings.ENVIRONMENT_SHADOWS))), every=True),
+    "opacity_shadow.cl",
+    helper=True,
+)
+AFTER = Feature("hits in order", Joint((OPACITY_SHADOWS,)), "after.cl", helper=True)
+OPACITY_SPHERE = Feature("round opacity", Joint((OPACITY, shapes.SPHERES), every=True), "opaque_sphere.cl", helper=True)
+ALPHA = Feature(
+    "alpha",
+    _map_caller("alpha_texture"),
+    "alpha.cl",
+    material=(("alpha_texture", np.int32), ("alpha_cutoff", REAL)),
+    needs=(OPACITY,),
+    helper=True,
+)
+NORMAL_MAP = Feature(
+    "normal map", _map_caller("normal_map"), "normalmap.cl", material=(("normal_map", np.int32), ("normal_strength", REAL))
+)
+NORMAL_GLOBE = Feature("round normal map", Joint((NORMAL_MAP, shapes.SPHERES), every=True), "normalmap_globe.cl", helper=True)
+PICTURES = Feature(
+    "pictures",
+    Joint((surfaces.TEXTURES, ALPHA, NORMAL_MAP)),
+    "texture.cl",
+    parameters=(
+        ("textures", "global const Texture *textures"),
+        ("texels", "global const uchar *texels"),
+        ("texel_values", "global const real *texel_values"),
+        ("corner_uvs", "global const double *corner_uvs"),
+    ),
+    helper=True,
+)
+GLOBE = Feature("globe", _round_picture_caller, "globe.cl", needs=(shapes.SPHERES, PICTURES), helper=True)
