@@ -27,7 +27,7 @@ static __attribute__((noinline)) void arealight_draw(global const Emitter *emitt
                                                      real *chance, real *slack) {
     for (int k = 0; k < LANES; k++) {
         global const Emitter *emitter = emitters + arealight_find(emitters, count, pick[k]);
-        real at[3], normal[3], to[3], square = 0, cosine = 0;
+        real at[3], normal[3], to[3], square = 0, cosine = 0, least = AREALIGHT_LEAST_COS;
         chance[k] = emitter->luminance / power;
         if (emitter->radius > R(0.0)) {
             real distance = 0, axis[3];
@@ -62,7 +62,8 @@ static __attribute__((noinline)) void arealight_draw(global const Emitter *emitt
             for (int a = 0; a < 3; a++) to[a] = from[a * LANES + k] - at[a], square += to[a] * to[a];
             for (int a = 0; a < 3; a++) cosine += to[a] * normal[a];
             cosine = fabs(cosine) / sqrt(square);
-            if (!outside) chance[k] *= square / cosine;
+            if (outside) least = R(-1.0);  // its limb is drawn as any point of the cone
+            else chance[k] *= square / cosine;
         } else {
             const real root = sqrt(first[k]), one = root * (R(1.0) - second[k]), two = root * second[k];
             for (int a = 0; a < 3; a++) at[a] = emitter->corner[a] + one * emitter->e1[a] + two * emitter->e2[a];
@@ -72,7 +73,7 @@ static __attribute__((noinline)) void arealight_draw(global const Emitter *emitt
             chance[k] *= square / cosine;
         }
         // A light seen edge-on, or from where it stands, gives nothing.
-        if (!(square > R(0.0)) || !(cosine > AREALIGHT_LEAST_COS)) chance[k] = R(0.0);
+        if (!(square > R(0.0)) || !(cosine > least)) chance[k] = R(0.0);
         // Off by `bound` across the light, the point is off by that over the cosine along the way. Where a way meets a sphere is known no better
         // than the discriminant, to 16u r d (sphere.cl), which is 8u d over the cosine.
         const real across = emitter->bound + (emitter->radius > R(0.0) ? R(32.0) * UNIT_ROUNDOFF * sqrt(square) : R(0.0));
