@@ -82,7 +82,9 @@ HOT void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
             //@ bounce_weights
             real_n direction[3];
             bounce_reflected(&rays, &hit, direction);
+            //@ reflected_drawn
             bounce_push(&geometry, &rays, &bounces, &hit, direction, weight * reflected, is_greater(weight * reflected, (real_n)0), &current);
+            //@ reflected_pushed
         }
 //@end
 //@hook next

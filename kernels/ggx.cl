@@ -1,5 +1,5 @@
 // Provides: Facets: a rough surface of GGX microfacets and the viewer's side of it; ggx_*: its density, shadowing, draws and albedo.
-// Needs: lanes.cl.  Reads: REAL_BITS.
+// Needs: hit.cl, rays.cl.  Reads: nothing.
 //
 // Isotropic, in a frame whose z is the normal; o points to the viewer, i to where light comes from, m is a facet's normal, h the half vector.
 // With s(v) = sqrt(v_z^2 + alpha^2 (1 - v_z^2)), the length of v stretched, no formula has a difference of nearly equal numbers:
@@ -13,7 +13,7 @@
 // | D G2 / (4 o_z)        | D i_z / (2 (o_z s(i) + i_z s(o)))                  | correlated               | that of D, 16u                    |
 // | pdf of i              | D / (2 (o_z + s(o)))                               | Heitz 2018, equation 17  | that of D, 10u                    |
 // | m by visible normals  | a point of a spherical cap, unstretched            | Dupuy and Benyoub 2023   | 20u of its slope, and of alpha    |
-// | albedo of the lobe    | bilinear in a table made in float64                | quadrature on the host   | 3e-4 absolutely                   |
+// | albedo of the lobe    | bilinear in a table made in float64                | quadrature on the host   | 4e-4 absolutely                   |
 //
 // alpha is at least GGX_LEAST_ALPHA: below that the angle of a half vector in float32 is mere rounding, and a pixel sees a mirror.
 #define GGX_LEAST_ALPHA R(1e-4)
@@ -48,6 +48,14 @@ HOT real_n ggx_table(global const real *table, const int rows, const int columns
         value[k] = (R(1.0) - a) * ((R(1.0) - b) * at[0] + b * at[1]) + a * ((R(1.0) - b) * at[columns] + b * at[columns + 1]);
     }
     return load_lanes(value);
+}
+
+// The normal that facets lie about: the shading one, or the true one where the viewer, or its mirror image, is not above the surface by that.
+HOT void ggx_normal(const Rays *rays, const Hit *hit, real_n *normal) {
+    const real_n cosine = -dot_n(rays->direction, hit->normal);
+    const real_n mirrored = dot_n(rays->direction, hit->geometric) + R(2.0) * cosine * dot_n(hit->normal, hit->geometric);
+    const mask_n serves = is_greater(cosine, (real_n)0) & is_greater(mirrored, (real_n)0);
+    for (int a = 0; a < 3; a++) normal[a] = choose(serves, hit->normal[a], hit->geometric[a]);
 }
 
 // The facets about the unit normal `normal`, met by rays along `direction`, which comes from above: normal . direction < 0.
@@ -102,15 +110,15 @@ HOT void ggx_draw(const Facets *facets, real_n u, real_n v, real_n *facet) {
     normalize_n(facet);
 }
 
-// `local`, of the frame, as a direction of the scene.
-HOT void ggx_world(const Facets *facets, const real_n *local, real_n *direction) {
-    for (int a = 0; a < 3; a++) direction[a] = local[0] * facets->x[a] + local[1] * facets->y[a] + local[2] * facets->z[a];
+// `inner`, of the frame, as a direction of the scene.
+HOT void ggx_world(const Facets *facets, const real_n *inner, real_n *direction) {
+    for (int a = 0; a < 3; a++) direction[a] = inner[0] * facets->x[a] + inner[1] * facets->y[a] + inner[2] * facets->z[a];
 }
 
 // The mirror image of the viewer in a facet: in the frame as well. Gives the cosine between the viewer and the facet.
-HOT real_n ggx_mirrored(const Facets *facets, const real_n *facet, real_n *local) {
+HOT real_n ggx_mirrored(const Facets *facets, const real_n *facet, real_n *inner) {
     const real_n cosine = max_n(dot_n(facets->out, facet), (real_n)0);
-    for (int a = 0; a < 3; a++) local[a] = R(2.0) * cosine * facet[a] - facets->out[a];
+    for (int a = 0; a < 3; a++) inner[a] = R(2.0) * cosine * facet[a] - facets->out[a];
     return min_n(cosine, (real_n)1);
 }
 
@@ -127,3 +135,10 @@ HOT real_n ggx_met(const Facets *facets, const real_n *direction, const real_n *
     const real_n along = dot_n(half_way, facets->z) / sqrt(length_2);
     return ggx_density(along, dot_n(cross, cross) / length_2, facets->alpha);
 }
+
+//@hook geometry_members
+    global const real *facet_albedos;
+//@end
+//@hook begin
+    geometry.facet_albedos = facet_albedos;
+//@end

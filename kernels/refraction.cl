@@ -166,9 +166,11 @@ static inline void refraction_turn(global const Material *materials, global cons
             if (media[0] > 1) media_walls(&geometry, materials, surfaces, media, frame->extent, &rays, &hit, &start, &behind);
             refraction_turn(materials, surfaces, media, frame->triangle_slots, frame->object_count, &rays, &hit, &current.media, through,
                             &behind, &passed, &internal);
+            //@ refraction_turned
             //@ refraction_weights
             //@counting count_rays(counters, COUNT_REFRACTED, is_greater(passed * weight, (real_n)0));
             //@counting count_rays(counters, COUNT_INTERNAL, is_greater(internal * weight, (real_n)0));
+            //@ refraction_sent
             bounce_push(&geometry, &rays, &bounces, &hit, through, weight * passed, is_greater(passed * weight, (real_n)0), &current)->media = behind;
             reflected += internal;
 //@end

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device import arrays_environment, layout, texels
+from clrt.device import arrays_environment, arrays_rough, layout, texels
 from clrt.device.arrays_emitters import emitters
 from clrt.device.packed import FloatArray, Packed
 from clrt.device.program import MEDIA_DEPTH, light_dtype
@@ -104,6 +104,7 @@ def _absorption(packed: Packed) -> NDArray[Any]:
 
 PACKERS: dict[str, Packer] = {
     "emitters": emitters,
+    "facet_albedos": arrays_rough.facet_albedos, "glass_albedos": arrays_rough.glass_albedos,
     "lights": _lights, "suns": _suns, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media, "absorption": _absorption,
     "sample_range": _sample_range, "sample_sums": _sample_sums,
     "environment_cells": arrays_environment.cells, "environment_rows": arrays_environment.rows,

@@ -75,7 +75,8 @@ class Word:
     apply : what the line does to the draft
     keys : written key=value in any order, each with the default of a line that leaves it out
     once : a second line with the word is an error
-    of : "material": belongs to the material above it; "glass": that has to have Refract > 0, too. `once` then means once a material
+    of : "material": belongs to the material above it; "glass": that has to have Refract > 0, too; "shiny": Reflect or Refract > 0.
+        `once` then means once a material
     check : notes what is wrong with a line beyond its fields
     """
 
@@ -84,7 +85,7 @@ class Word:
     apply: Callable[[Draft, WordCall], None]
     keys: tuple[tuple[Field | Text | Choice, Value], ...] = ()
     once: bool = True
-    of: Literal["", "material", "glass"] = ""
+    of: Literal["", "material", "glass", "shiny"] = ""
     check: Callable[[WordCall, Faults], None] | None = None
 
 

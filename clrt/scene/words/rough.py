@@ -1,0 +1,20 @@
+"""Words of rough surfaces: gloss."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from clrt.scene.grammar import Field
+from clrt.scene.words.word import Draft, Word, WordCall, material_above
+
+_ROUGHNESS = Field("roughness", low=0.0, high=1.0)
+
+
+def _set_gloss(draft: Draft, call: WordCall) -> None:
+    i = material_above(draft, call)
+    draft.materials[i] = replace(draft.materials[i], gloss=call.number("roughness"), gloss_line=call.line)
+
+
+WORDS: dict[str, Word] = {
+    "gloss": Word((_ROUGHNESS,), "gloss 0.3", _set_gloss, of="shiny"),
+}
