@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,6 +39,8 @@ class Options:
     right_handed: bool
     split_objects: bool
     allow_path: tuple[Path, ...]
+    camera: int | None
+    without: tuple[str, ...]
 
 
 @click.command("render", short_help="Render a scene; the word is never needed.")
@@ -64,7 +65,9 @@ class Options:
 @click.option("--srgb", is_flag=True, help="Encode the picture as sRGB; without it the linear values are written.")
 @click.option("--right-handed", is_flag=True, help="Mirror x: for scenes made in right-handed axes.")
 @click.option("--split-objects", is_flag=True, help="Make each connected component an object, where the scene marks none.")
+@click.option("--camera", type=kinds.whole(1), metavar="N", help="Which camera of a glTF file to look through.  [default: 1]")
 @click.option("--allow-path", type=kinds.file, multiple=True, metavar="DIR", help="Permit the scene to name files in DIR, too.")
+@click.option("--without", multiple=True, metavar="EFFECT", help="Leave out an effect that `clrt explain` lists; may be repeated.")
 @click.option("-q", "--quiet", is_flag=True, help="Print no figures and no progress.")
 def render(**arguments: Any) -> None:
     """Render SCENE to a picture. The same as `clrt SCENE`."""
@@ -106,11 +109,13 @@ def _check(options: Options, scene_path: Path, picture: Path) -> None:
     figures = None if options.stats is kinds.STDOUT else options.stats
     outputs = {"picture": picture, "file of figures": figures, "kernel": options.dump_kernel}
     paths.check_outputs({"scene": scene_path}, outputs)
+    from clrt.features.choice import effect_names
     from clrt.image.image import check_format
     from clrt.precision import rung
 
     check_format(picture, options.srgb)
     rung(options.precision)
+    effect_names(options.without)
 
 
 def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene, float]:
@@ -120,7 +125,8 @@ def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene,
     progress("read", 0.0)
     start = time.perf_counter()
     scene = load_scene(
-        path, right_handed=options.right_handed, split_objects=options.split_objects, allow_paths=options.allow_path
+        path, right_handed=options.right_handed, split_objects=options.split_objects, allow_paths=options.allow_path,
+        camera=options.camera,
     )
     for warning in scene.warnings:
         failure.warn(f"{scene.source}: {warning}")
@@ -130,28 +136,27 @@ def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene,
 def _render(options: Options, scene: Scene, progress: PhaseProgress) -> Image:
     from clrt.renderer import render as render_scene
 
-    return render_scene(
-        scene,
-        size=options.size,
-        tree=options.tree,
-        device=options.device,
-        precision=options.precision,
-        depth=options.depth,
-        samples=options.samples,
-        seed=options.seed,
-        count=options.stats is not None,
-        progress=progress,
-        dump_kernel=options.dump_kernel,
-    )
+    with failure.warnings_told():
+        return render_scene(
+            scene,
+            size=options.size,
+            tree=options.tree,
+            device=options.device,
+            precision=options.precision,
+            depth=options.depth,
+            samples=options.samples,
+            seed=options.seed,
+            count=options.stats is not None,
+            without=options.without,
+            progress=progress,
+            dump_kernel=options.dump_kernel,
+        )
 
 
 def _write(options: Options, image: Image, picture: Path, progress: PhaseProgress) -> float:
     """Write the picture; the seconds it took. Warnings about its pixels are printed."""
     progress("write", 0.0)
     start = time.perf_counter()
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", RuntimeWarning)
+    with failure.warnings_told():
         image.save(picture, srgb=options.srgb)
-    for warning in caught:
-        failure.warn(str(warning.message))
     return time.perf_counter() - start

@@ -19,6 +19,7 @@ from clrt.scene.grammar import LETTERS
 from clrt.scene.instances import build_instances, splits
 from clrt.scene.model import Instance, Material, MeshObject, PointLight, Scene, Spheres
 from clrt.scene.models.direct import is_model, load_model_scene
+from clrt.scene.motion import with_motion
 from clrt.scene.objects import build_objects, material_of
 from clrt.scene.picture import Folders
 from clrt.scene.text import Declarations, read_declarations, read_file
@@ -89,8 +90,10 @@ def parse_scene(
         camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,
         source, tuple(warnings), textures=textured.textures, spots=tuple(draft.spots), suns=tuple(draft.suns),
     )  # fmt: skip
-    scene = replace(scene, samples=draft.samples, samples_line=draft.samples_line, lens=draft.lens, environment=environment, **draft.fields)
+    scene = replace(scene, samples=draft.samples, samples_line=draft.samples_line, environment=environment, **draft.fields)
     scene = replace(scene, instances=instances)
+    scene = with_motion(scene, found, faults)
+    faults.raise_if_any()
     return _mirrored(scene) if right_handed else scene
 
 
@@ -198,6 +201,8 @@ def _mirrored(scene: Scene) -> Scene:
     # Its picture is never seen mirrored: only the way round in which it is turned changes.
     around = scene.environment and replace(scene.environment, rotation=-scene.environment.rotation)
     scene = replace(scene, environment=around)
+    shutter = scene.shutter and replace(scene.shutter, eye_motion=_turned(scene.shutter.eye_motion))
+    scene = replace(scene, shutter=shutter)
     instances = tuple(map(_mirrored_instance, scene.instances))
     scene = replace(scene, instances=instances)
     return replace(scene, lights=lights, spots=spots, suns=suns, objects=tuple(map(_mirrored_object, scene.objects)), spheres=spheres)
@@ -209,7 +214,7 @@ def _turned(vector: tuple[float, float, float]) -> tuple[float, float, float]:
 
 def _mirrored_object(mesh: MeshObject) -> MeshObject:
     smooth = None if mesh.vertex_normals is None else flip_x(mesh.vertex_normals)
-    return replace(mesh, vertices=flip_x(mesh.vertices), normals=flip_x(mesh.normals), vertex_normals=smooth)
+    return replace(mesh, vertices=flip_x(mesh.vertices), normals=flip_x(mesh.normals), vertex_normals=smooth, motion=_turned(mesh.motion))
 
 
 def _mirrored_instance(instance: Instance) -> Instance:

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from clrt.errors import SceneError
-from clrt.scene.model import Camera, FloatArray, Material, MeshObject, Scene
+from clrt.scene.model import Camera, FloatArray, Instance, Material, MeshObject, Scene
 from clrt.scene.models.gltf import EXTENSIONS, read_gltf
 from clrt.scene.models.gltf_materials import default_material
 from clrt.scene.models.model_file import Model, ModelError, View
-from clrt.scene.models.place import SCENE_FROM_FILE, Placing, flat_warnings, place
+from clrt.scene.models.place import SCENE_FROM_FILE, Placing, flat_warnings, placed
 from clrt.scene.picture import Folders
 from clrt.scene.sky import default_sky
 from clrt.scene.triangles import unit
@@ -51,17 +51,14 @@ def load_model_scene(path: Path, *, camera: int | None = None, allow_paths: Sequ
 def scene_of(model: Model, source: str, camera: int | None = None) -> Scene:
     """The model in front of a camera. Raises ModelError."""
     warnings = list(model.warnings)
-    objects, first = list[MeshObject](), 0
-    for part in model.parts:
-        objects.append(place(part, Placing(SCENE_FROM_FILE, material=len(model.materials)), first))
-        first += len(part.vertices)
-    warnings += flat_warnings(tuple(objects))
+    objects, instances = placed(model, Placing(SCENE_FROM_FILE, material=len(model.materials)))
+    warnings += flat_warnings(objects)
     materials: tuple[Material, ...] = (*model.materials, default_material())
     view = _chosen(model, camera, warnings)
-    seen = framed(objects) if view is None else camera_of(view)
+    seen = framed(objects, instances) if view is None else camera_of(view)
     scene = Scene(
-        seen, tuple(replace(light, position=_flip(light.position)) for light in model.lights), materials, tuple(objects), source=source,
-        textures=model.textures, samples=_SAMPLES,
+        seen, tuple(replace(light, position=_flip(light.position)) for light in model.lights), materials, objects, instances=instances,
+        source=source, textures=model.textures, samples=_SAMPLES,
         spots=tuple(replace(s, position=_flip(s.position), direction=_flip(s.direction)) for s in model.spots),
         suns=tuple(replace(s, direction=_flip(s.direction)) for s in model.suns),
     )  # fmt: skip
@@ -115,13 +112,15 @@ def _size(aspect: float) -> tuple[int, int]:
     return max(1, round(LONGER_SIDE * aspect)), LONGER_SIDE
 
 
-def framed(objects: Sequence[MeshObject]) -> Camera:
+def framed(objects: Sequence[MeshObject], instances: Sequence[Instance] = ()) -> Camera:
     """A view from the front, the right and a little above that holds all vertices, 85% of it wide or high.
 
     With the eye at distance D from the middle of the box, along the view, a vertex that lies (x, y, z) from there as the eye sees it is
     within the picture if |x| <= k (D + z): so D is the greatest |x| / k - z, for x and y alike.
     """
-    points = np.concatenate([item.vertices.reshape(-1, 3) for item in objects])
+    points = np.concatenate([item.vertices.reshape(-1, 3) for item in objects if not item.hidden] + [
+        objects[i.object].vertices.reshape(-1, 3) @ i.world_from_object[:, :3].T + i.world_from_object[:, 3] for i in instances
+    ])  # fmt: skip
     lo, hi = points.min(axis=0), points.max(axis=0)
     middle = lo / 2.0 + hi / 2.0
     forward = unit(np.array(_VIEW))

@@ -12,11 +12,13 @@ from clrt.scene.models.gltf_file import Document, open_document
 from clrt.scene.models.gltf_json import Item
 from clrt.scene.models.gltf_materials import read_materials
 from clrt.scene.models.gltf_mesh import read_mesh
-from clrt.scene.models.gltf_nodes import cofactors, placed_nodes
+from clrt.scene.models.gltf_nodes import corner_order, normal_matrix, placed_nodes
 from clrt.scene.models.model_file import Model, ModelError, Part, View
 from clrt.scene.picture import Folders
+from clrt.scene.words.instances import MOST_SCALE
 
 EXTENSIONS = (".gltf", ".glb")
+_SAME_SCALE = 1e-6  #: relative difference of scales that counts as none: quaternions in files are rounded to float32
 
 
 def read_gltf(data: bytes, folders: Folders) -> Model:
@@ -24,16 +26,16 @@ def read_gltf(data: bytes, folders: Folders) -> Model:
     document = open_document(data, folders)
     materials = read_materials(document)
     apart = [material.refract > 0.0 for material in materials.materials]
-    meshes, shapes = document.root.items("meshes"), dict[int, tuple[Part, ...]]()
+    meshes, standing = document.root.items("meshes"), dict[int, list[tuple[str, FloatArray]]]()
     placed = _Placed(document)
-    parts: list[Part] = []
     for node, world_from_node in placed_nodes(document):
         if node.has("mesh"):
-            index = node.refer("mesh", meshes, "mesh")
-            if index not in shapes:
-                shapes[index] = read_mesh(document, meshes[index], materials.placing, apart)
-            parts += [moved(part, world_from_node, node.text("name", part.name)) for part in shapes[index]]
+            standing.setdefault(node.refer("mesh", meshes, "mesh"), []).append((node.text("name"), world_from_node))
         placed.add(node, world_from_node)
+    parts: list[Part] = []
+    for index, places in standing.items():
+        for part in read_mesh(document, meshes[index], materials.placing, apart):
+            parts += _standing(part, places)
     if not parts:
         raise ModelError("has no faces; there is nothing to render (no mesh with triangles stands in its scene)")
     _note_unread(document)
@@ -43,12 +45,29 @@ def read_gltf(data: bytes, folders: Folders) -> Model:
     )  # fmt: skip
 
 
+def _standing(part: Part, places: list[tuple[str, FloatArray]]) -> list[Part]:
+    """The part where nodes put it: kept once, with its copies, where several do by turns, shifts and scales; else each for itself."""
+    copies = tuple(matrix for _, matrix in places if _makes_copies(part, matrix[:3, :3]))
+    if len(copies) < 2:
+        return [moved(part, matrix, name or part.name) for name, matrix in places]
+    others = [(name, matrix) for name, matrix in places if not _makes_copies(part, matrix[:3, :3])]
+    return [replace(part, copies=copies), *(moved(part, matrix, name or part.name) for name, matrix in others)]
+
+
+def _makes_copies(part: Part, linear: FloatArray) -> bool:
+    """Whether an Instance may have this transform: no mirror, no extreme scale, one for all axes where there are normals at corners."""
+    scales = np.linalg.svd(linear, compute_uv=False)
+    even = part.normals is None or scales.max() <= scales.min() * (1.0 + _SAME_SCALE)
+    return bool(even and scales.min() >= 1.0 / MOST_SCALE and scales.max() <= MOST_SCALE and np.linalg.det(linear) > 0.0)
+
+
 def moved(part: Part, world_from_part: FloatArray, name: str) -> Part:
     """The part where its node puts it."""
     linear = world_from_part[:3, :3]
-    vertices = part.vertices @ linear.T + world_from_part[:3, 3]
-    normals = None if part.normals is None else part.normals @ cofactors(linear).T
-    return replace(part, vertices=vertices, normals=normals, name=name)
+    order = corner_order(linear)
+    vertices = part.vertices[:, order] @ linear.T + world_from_part[:3, 3]
+    normals = None if part.normals is None else part.normals[:, order] @ normal_matrix(linear).T
+    return replace(part, vertices=vertices, normals=normals, uvs=None if part.uvs is None else part.uvs[:, order], name=name)
 
 
 def _note_unread(document: Document) -> None:

@@ -64,7 +64,14 @@ def rotation(quaternion: FloatArray) -> FloatArray:
     ])  # fmt: skip
 
 
-def cofactors(matrix: FloatArray) -> FloatArray:
-    """(3, 3): what takes normals along when `matrix` (3, 3) takes points; also where it has no inverse."""
+def normal_matrix(matrix: FloatArray) -> FloatArray:
+    """(3, 3): what takes normals along, up to their length, when `matrix` (3, 3) takes points: its cofactors, which it has without an
+    inverse, too; turned round for a mirror, which keeps the outer side the outer one."""
     a, b, c = matrix
-    return np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+    cofactors = np.array([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
+    return 0.0 - cofactors if np.linalg.det(matrix) < 0.0 else cofactors
+
+
+def corner_order(matrix: FloatArray) -> list[int]:
+    """The order of a triangle's corners in which the cross product of its edges points to the same side, moved by `matrix` (3, 3)."""
+    return [0, 2, 1] if np.linalg.det(matrix) < 0.0 else [0, 1, 2]

@@ -27,6 +27,7 @@ class Part:
     vertices : (n, 3, 3) float64; material_ids : (n,) int32 into the model's materials, -1 where the file has none
     normals : (n, 3, 3) float64 at the corners as the file has them, zero where it has none; None without any
     uvs : (n, 3, 2) float64, v up, or None
+    copies : where the part stands, each (4, 4) float64; none: once, as it is
     """
 
     vertices: FloatArray
@@ -34,6 +35,7 @@ class Part:
     normals: FloatArray | None = None
     uvs: FloatArray | None = None
     name: str = "mesh"
+    copies: tuple[FloatArray, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from clrt.mesh import vertex_normals
 from clrt.scene.grammar import LARGEST
-from clrt.scene.model import FloatArray, MeshObject
-from clrt.scene.models.gltf_nodes import cofactors
-from clrt.scene.models.model_file import ModelError, Part
+from clrt.scene.model import FloatArray, Instance, MeshObject
+from clrt.scene.models.gltf_nodes import corner_order, normal_matrix
+from clrt.scene.models.model_file import Model, ModelError, Part
 from clrt.scene.triangles import face_normals, unit
 
 #: Model files are right-handed, +z towards the viewer; scenes are left-handed, +z into the picture. Mirroring z, a model is seen from its
@@ -32,11 +32,28 @@ class Placing:
     line: int = 0
 
 
+def placed(model: Model, at: Placing, first_prim: int = 0, first_object: int = 0) -> tuple[tuple[MeshObject, ...], tuple[Instance, ...]]:
+    """All parts of a model as objects, and the copies of those that have some as instances. Raises ModelError.
+
+    first_prim, first_object : numbers of the triangles and of the objects that the scene has already
+    """
+    objects: list[MeshObject] = []
+    instances: list[Instance] = []
+    file_from_scene = np.linalg.inv(at.scene_from_file)
+    for part in model.parts:
+        for copy in part.copies:
+            matrix = (at.scene_from_file @ copy @ file_from_scene)[:3]
+            instances.append(Instance(first_object + len(objects), matrix, at.line, part.name))
+        item = place(part, at, first_prim)
+        objects.append(replace(item, hidden=True) if part.copies else item)
+        first_prim += len(part.vertices)
+    return tuple(objects), tuple(instances)
+
+
 def place(part: Part, at: Placing, first_prim: int) -> MeshObject:
     """The part as an object. Raises ModelError where its numbers are beyond the range of a scene's."""
     linear, moved = at.scene_from_file[:3, :3], at.scene_from_file[:3, 3]
-    # A mirror turns the winding round: with two corners swapped, the cross product of the edges stays on the same side.
-    order = [0, 2, 1] if np.linalg.det(linear) < 0.0 else [0, 1, 2]
+    order = corner_order(linear)
     vertices = part.vertices[:, order] @ linear.T + moved
     if not np.abs(vertices).max(initial=0.0) <= LARGEST:
         raise ModelError(f"{part.name}: a vertex lies beyond {LARGEST:g}; scale the model in the program that made it")
@@ -55,7 +72,7 @@ def _corner_normals(part: Part, vertices: FloatArray, smooth: str, order: list[i
     if part.normals is None:
         points = vertices.reshape(-1, 3)
         return vertex_normals(points, np.arange(len(points)).reshape(-1, 3)).reshape(-1, 3, 3)
-    return np.asarray(part.normals[:, order] @ cofactors(linear).T)
+    return np.asarray(part.normals[:, order] @ normal_matrix(linear).T)
 
 
 def _checked(given: FloatArray, faces: FloatArray) -> FloatArray | None:
