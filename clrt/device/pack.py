@@ -157,7 +157,8 @@ def _frame(
         "extent": objects["extent"].max(initial=0.0), "width": camera.width, "height": camera.height,
         "object_count": len(objects), "triangle_slots": slots,
     }  # fmt: skip
-    values |= {name: value(scene) for f in features.active for name, *_, value in f.frame}
+    values |= {name: value(scene) for f in features.active if not features.idle(f) for name, *_, value in f.frame}
+    values |= {f.switch_name: not features.idle(f) for f in features.switches}
     for name, value in values.items():
         record[name] = value
     return record

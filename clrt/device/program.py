@@ -116,7 +116,9 @@ def light_dtype(features: Features, real: type) -> np.dtype[np.void]:
 
 
 def frame_dtype(features: Features, precision: Precision) -> np.dtype[np.void]:
-    return layout.frame(precision.real, [(n, precision.real if t is REAL else t, *shape) for f in features.active for n, t, *shape, _ in f.frame])
+    switches: list[layout.Field] = [(f.switch_name, np.int32) for f in features.switches]
+    members = [(n, precision.real if t is REAL else t, *shape) for f in features.active for n, t, *shape, _ in f.frame]
+    return layout.frame(precision.real, [*switches, *members])
 
 
 def _defines(features: Features, precision: Precision, lanes: int, shape: Shape, counting: bool) -> str:
@@ -133,7 +135,8 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     if counting:
         values |= {f"COUNT_{kind.upper()}": i for i, kind in enumerate(features.ray_kinds)}
         values["COUNT_TESTS"] = len(features.ray_kinds)
-    return "".join(f"#define {name} {value}\n" for name, value in values.items())
+    switches = {f.switch_name.upper(): f"(frame->{f.switch_name})" if features.every else "1" for f in features.active if f.switch}
+    return "".join(f"#define {name} {value}\n" for name, value in {**values, **switches}.items())
 
 
 def _insert(name: str, text: str, hooks: dict[str, list[tuple[str, str, int]]]) -> str:

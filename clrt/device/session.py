@@ -49,7 +49,7 @@ class Buffers:
         self.vertices = self.upload(packed.vertices)
         self.core = [self.upload(a) for a in (packed.nodes, packed.indices, packed.objects, packed.surfaces, packed.materials)]
         self.effects = {
-            name: self.upload(PACKERS[name](packed), writable=name == "sample_sums")
+            name: self.upload(np.zeros(0, np.int32) if features.idle(f) else PACKERS[name](packed), writable=name == "sample_sums")
             for f in features.active for name, _ in f.parameters if name != "light_planes"
         }
         self.triangles = self.empty(max(1, packed.slots) * layout.triangle(precision.real).itemsize)

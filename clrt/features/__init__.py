@@ -10,7 +10,7 @@ a reference function, a smallest scene and a test. No other effect's file change
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from clrt.features import camera, cutouts, helpers, lamps, rough, sampled, shapes, surfaces, surroundings
 from clrt.features.feature import REAL, Calls, Feature
@@ -78,9 +78,13 @@ HELPERS = frozenset(f.name for f in FEATURES if f.helper)  #: parts that effects
 
 @dataclass(frozen=True)
 class Features:
-    """The effects of one scene: `lines` maps each called-for feature to the line that calls for it (0: no text)."""
+    """The effects of one scene: `lines` maps each called-for feature to the line that calls for it (0: no text).
+
+    every : the program is to hold all features there are; those without a line are not to act. For comparisons alone.
+    """
 
     lines: tuple[tuple[str, int], ...]
+    every: bool = False
 
     @classmethod
     def of(cls, scene: Scene, without: Iterable[str] = ()) -> Features:
@@ -94,20 +98,35 @@ class Features:
         wanted = frozenset(names)
         return cls._where(lambda feature: 0 if feature.name in wanted else None)
 
+    def with_every(self) -> Features:
+        """The same effects in a program that holds the code of all."""
+        return replace(self, every=True)
+
     @classmethod
     def _where(cls, calls: Calls) -> Features:
         return cls(tuple((f.name, line) for f in FEATURES if (line := f.line(calls)) is not None))
 
     @property
     def active(self) -> tuple[Feature, ...]:
-        """The called-for features and their helpers, in the order of the program."""
+        """The features in the program, helpers included, in its order: those that are called for, or every one."""
+        if self.every:
+            return FEATURES
         names = {name for name, _ in self.lines}
         return tuple(f for f in FEATURES if f.name in names)
 
     @property
     def effects(self) -> tuple[str, ...]:
-        """Names of the effects, helpers left out."""
+        """Names of the effects in the program, helpers left out."""
         return tuple(f.name for f in self.active if f.name not in HELPERS)
+
+    @property
+    def switches(self) -> tuple[Feature, ...]:
+        """The features that are switched on and off while the program runs."""
+        return tuple(f for f in FEATURES if f.switch) if self.every else ()
+
+    def idle(self, feature: Feature) -> bool:
+        """The feature is in the program and switched off, so that what it is given is never looked at."""
+        return feature in self.switches and feature.name not in dict(self.lines)
 
     @property
     def ray_kinds(self) -> tuple[str, ...]:

@@ -32,6 +32,7 @@ class Feature:
     sampled : it draws random numbers: what is seen is a mean of samples
     needs : what must be in the program for this one to be: without one of these there is nothing that it could change
     helper : a part that effects share; no effect of its own
+    switch : it acts though no data ask for it, so its code asks HAVE_<NAME> in a program of all effects; 1 in any other
     """
 
     name: str
@@ -47,6 +48,12 @@ class Feature:
     sampled: bool = False
     needs: tuple[Feature, ...] = ()
     helper: bool = False
+    switch: bool = False
+
+    @property
+    def switch_name(self) -> str:
+        """The member of the frame that a program of all effects reads; in capitals, the macro that the code asks."""
+        return "have_" + self.name.replace(" ", "_")
 
     def line(self, calls: Calls) -> int | None:
         """The line that calls for it where `calls` tells that of each effect; None where nothing does, or what it needs is not there."""
