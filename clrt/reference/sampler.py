@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 WordArray = NDArray[np.uint32]
 
-PIXEL, LENS = 0, 2  #: first dimension of each use
+PIXEL, LENS, TIME = 0, 2, 4  #: first dimension of each use
 _GOLDEN = 0x9E3779B9
 _SHUFFLE = 0xA511E9B3
 _FACTORS = (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6)

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from clrt.scene.faults import Faults
 from clrt.scene.grammar import Field, color_fields
-from clrt.scene.model import Lens, Material, PointLight, SpotLight, SunLight
+from clrt.scene.model import Material, PointLight, SpotLight, SunLight
 
 Value = float | str
 
@@ -63,7 +63,6 @@ class Draft:
     samples: int = 1
     samples_line: int = 0
     fields: dict[str, Any] = field(default_factory=dict)  #: of the Scene, by name, that words set as a whole
-    lens: Lens | None = None
 
 
 @dataclass(frozen=True)
