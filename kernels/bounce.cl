@@ -50,6 +50,7 @@ HOT int bounce_pop(BounceStack *stack, Bounce *current, real extent, Rays *rays)
     rays->t_max = (real_n)INFINITY;
     rays->skip = current->skip;
     rays->active = current->active;
+    //@ bounce_popped
     rays_prepare(rays, extent);
     return 1;
 }

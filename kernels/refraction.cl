@@ -69,6 +69,7 @@ static __attribute__((noinline)) void media_walls(const Geometry *geometry, glob
     for (int k = 0; k < LANES; k++) {
         through[k] = found[k] ? materials[hit->material[k]].refract : R(0.0);
         own[k] = hit->slot[k] < geometry->slot_count ? surfaces[hit->slot[k]].object : -1;
+        //@ media_own
     }
     const mask_n active = is_greater(load_lanes(through), (real_n)0) & is_at_least(load_lanes(own), NO_LANES);
     real_n start[3] = {hit->point[0], hit->point[1], hit->point[2]}, error = hit->error;
@@ -82,6 +83,7 @@ static __attribute__((noinline)) void media_walls(const Geometry *geometry, glob
     probe.active = active;
     rays_prepare(&probe, extent);
     for (int b = 0; b < geometry->object_count; b++) {
+        //@ media_wall
         const mask_n lanes = probe.active & ~is_equal(load_lanes(own), (mask_n)b);
         if (media[MEDIA_RANKS + b] < 0 || !any_lane(lanes)) continue;
         Hits hits;
@@ -97,6 +99,7 @@ static __attribute__((noinline)) void media_walls(const Geometry *geometry, glob
             if (wall->refract > R(0.0)) media_cross(inside, k, b, wall->ior);
         }
     }
+    //@ media_walls
 }
 
 // Snell's law, ratio r = n1 / n2: d' = r d + (r c - sqrt(k)) n with c = -d.n and k = 1 - r^2 (1 - c^2), taken as (1 - r)(1 + r) + (r c)^2:
@@ -129,6 +132,7 @@ static inline void refraction_turn(global const Material *materials, global cons
         if (!(refract > R(0.0))) continue;
         // The media on either side.
         const lane_int slot = hit->slot[k], object = slot < triangle_slots ? surfaces[slot].object : object_count + slot - triangle_slots;
+        //@ media_object
         media_cross(after, k, object, materials[hit->material[k]].ior);
         const real from = media_index(before, media, k), to = media_index(after, media, k);
         // About the shading normal, or about the true one where that would not lead behind the surface.

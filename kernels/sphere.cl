@@ -121,6 +121,17 @@ HOT void sphere_surface(const Geometry *geometry, Hit *hit) {
     geometry.spheres = spheres;
     geometry.sphere_count = frame->sphere_count;
 //@end
+//@hook tree_leaf
+    if (place >= geometry->tree_solids) {
+        // The one sphere, as if there were no other.
+        Geometry one = *geometry;
+        one.spheres += place - geometry->tree_solids;
+        one.slot_count += place - geometry->tree_solids;
+        one.sphere_count = 1;
+        sphere_trace(&one, rays, any_hit, hits);
+        return;
+    }
+//@end
 //@hook scene_trace
     sphere_trace(geometry, rays, any_hit, hits);
 //@end

@@ -106,3 +106,6 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
 //@hook hits_begin
         hits.low = hits.t * choose(is_less(hits.t, (real_n)0), R(1.0) + R(8.0) * UNIT_ROUNDOFF, R(1.0) - R(8.0) * UNIT_ROUNDOFF);
 //@end
+//@hook tree_ordered
+    ordered = 1;  // ties are settled triangle by triangle
+//@end
