@@ -92,7 +92,7 @@ class Primitives:
         object_id = np.concatenate([*(np.full(len(o), ids[id(o)]) for o in objects), len(objects) + np.arange(len(spheres))])
         largest = float(np.abs(np.concatenate([vertices.reshape(-1, 3), scene.camera.eye[None]])).max())
         uvs = np.concatenate([np.zeros((0, 3, 2)), *(np.zeros((len(o), 3, 2)) if o.uvs is None else o.uvs for o in objects)])
-        textured = np.array([m.texture >= 0 for m in scene.materials], np.bool_)[material]
+        textured = np.array([max(m.texture, m.normal_map) >= 0 for m in scene.materials], np.bool_)[material]
         curvature = np.concatenate([_curvature(vertices, corner), 1.0 / spheres.radii])
         return cls(vertices, _face_normals(vertices), corner, spheres.centers, spheres.radii, material, object_id.astype(np.int64),
                    curvature, curved, uvs, textured, largest, EdgeTable.build(vertices, largest))  # fmt: skip

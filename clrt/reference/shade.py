@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,6 @@ from clrt.reference.crossings import Rays
 from clrt.reference.geometry import MaterialTable, Primitives
 from clrt.reference.lights import Light, cone, falloff, positions
 from clrt.reference.terminator import face_between, lifts
-from clrt.reference.visibility import occluded
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -52,6 +52,16 @@ class Surface:
     def normal_err(self) -> FloatArray:
         """(m,) error of angles at the surface: of a direction, and of the normal of a curved one."""
         return self.dir_err + self.curvature * self.pos_err
+
+
+class Cover(Protocol):
+    """What primitives in the way of light keep of it, see clrt.reference.opacity."""
+
+    def passed(self, prims: Primitives, segments: Rays, tile_bytes: int) -> tuple[FloatArray, FloatArray]:
+        """The part of light that comes along m open segments, (m,), and its margin (m,)."""
+
+    def through_plane(self, prims: Primitives, segments: Rays, rows: IndexArray) -> tuple[FloatArray, FloatArray]:
+        """The part that the triangles on which the segments `rows` start let through where their planes are met, and its margin."""
 
 
 def dot(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -109,11 +119,13 @@ def _interpolated(prims: Primitives, tri: IndexArray, weights: FloatArray) -> Fl
 
 
 def local_color(
-    prims: Primitives, materials: MaterialTable, lights: tuple[Light, ...], surface: Surface, weight: FloatArray, tile_bytes: int
+    prims: Primitives, materials: MaterialTable, lights: tuple[Light, ...], surface: Surface, weight: FloatArray, tile_bytes: int,
+    cover: Cover,
 ) -> tuple[FloatArray, FloatArray, int]:
     """C (Ka + sum over lights of visible Lrgb (Kd N.L + Ks (R.V)^exponent)).
 
     weight : (m,) of the ray in its pixel; it only scales what counts as a decision
+    cover : what primitives in the way of light keep of it
     Returns color (m, 3), margin (m,) and the number of shadow rays traced.
     """
     ids = surface.material
@@ -127,38 +139,39 @@ def local_color(
         margin = np.minimum(margin, close)
         traced = np.flatnonzero(lit & (shine != 0.0) & (power != 0.0).any(axis=1) & (weight != 0.0))
         shadow_rays += len(traced)
-        blocked, closeness = _hidden(prims, surface, traced, position[traced], tile_bytes)
+        left, closeness = _let_through(prims, surface, traced, position[traced], tile_bytes, cover)
         counts = np.abs(shine * power.max(axis=1, initial=0.0) * weight)[traced] > NO_CONSEQUENCE
         margin[traced] = np.where(counts, np.minimum(margin[traced], closeness), margin[traced])
-        visible = traced[~blocked]
-        total[visible] += shine[visible, None] * np.array(light.color)
+        total[traced] += (left * shine[traced])[:, None] * np.array(light.color)
     return materials.color[ids] * total, margin, shadow_rays
 
 
-def _hidden(
-    prims: Primitives, surface: Surface, rows: IndexArray, position: FloatArray, tile_bytes: int
-) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Whether the light at `position` (k, 3) is hidden from the hits `rows`, (k,), and the margin (k,).
+def _let_through(
+    prims: Primitives, surface: Surface, rows: IndexArray, position: FloatArray, tile_bytes: int, cover: Cover
+) -> tuple[FloatArray, FloatArray]:
+    """The part of the light at `position` (k, 3) that comes to the hits `rows`, (k,), and the margin (k,).
 
     Segments run from the lifted hits to the light. The far end is exact: the direction adds no error but its own rounding.
     """
     origin = surface.point[rows] + surface.lift[rows]
-    hidden, margin = np.zeros(len(rows), np.bool_), np.zeros(len(rows))
+    left, margin = np.ones(len(rows)), np.zeros(len(rows))
     apart = np.flatnonzero((origin != position).any(axis=1))
     rows, origin, position = rows[apart], origin[apart], position[apart]
     segments = Rays(origin, position - origin, surface.prim[rows], surface.lift_err[rows], np.ones(len(rows)))
-    by_others, others = occluded(prims, segments, tile_bytes)
-    by_face, face = np.zeros(len(rows), np.bool_), np.full(len(rows), np.inf)
+    by_others, others = cover.passed(prims, segments, tile_bytes)
+    by_face, face = np.ones(len(rows)), np.full(len(rows), np.inf)
     at, tri = np.flatnonzero(surface.curved[rows]), surface.prim[rows[surface.curved[rows]]]
     curved = rows[at]
-    by_face[at], face[at] = face_between(
+    between, face[at] = face_between(
         prims.vertices[tri], surface.n_geo[curved], surface.point[curved], surface.lift[curved], position[at], surface.lift_err[curved]
     )
-    hidden[apart] = by_others | by_face
+    by_face[at[between]], texels = cover.through_plane(prims, segments, at[between])
+    face[at[between]] = np.minimum(face[at[between]], texels)
+    left[apart] = by_others * by_face
     # The firmer of two that block decides; where neither does, the one that is nearer to it.
-    firmer = np.maximum(np.where(by_others, others, 0.0), np.where(by_face, face, 0.0))
-    margin[apart] = np.where(hidden[apart], firmer, np.minimum(others, face))
-    return hidden, margin
+    firmer = np.maximum(np.where(by_others == 0.0, others, 0.0), np.where(by_face == 0.0, face, 0.0))
+    margin[apart] = np.where(left[apart] == 0.0, firmer, np.minimum(others, face))
+    return left, margin
 
 
 def _light_term(

@@ -20,14 +20,14 @@ def tints(scene: Scene, prims: Primitives, surface: Surface) -> tuple[FloatArray
     number = np.array([m.texture for m in scene.materials], np.int64)[surface.material]
     for index in np.unique(number[number >= 0]).tolist():
         rows, texture = np.flatnonzero(number == index), scene.textures[index]
-        uv, rate = _coordinates(prims, surface.prim[rows], surface.point[rows])
-        tint[rows] = _looked_up(texture, uv)
-        away = _from_jumps(texture, uv, rate, surface.prim[rows] >= prims.triangle_count)
+        uv, rate = coordinates(prims, surface.prim[rows], surface.point[rows])
+        tint[rows] = looked_up(texture, uv)[:, :3]
+        away = from_jumps(texture, uv, rate, surface.prim[rows] >= prims.triangle_count)
         margin[rows] = np.divide(away, surface.pos_err[rows], where=surface.pos_err[rows] > 0.0, out=np.full(len(rows), np.inf))
     return tint, margin
 
 
-def _coordinates(prims: Primitives, prim: IndexArray, point: FloatArray) -> tuple[FloatArray, FloatArray]:
+def coordinates(prims: Primitives, prim: IndexArray, point: FloatArray) -> tuple[FloatArray, FloatArray]:
     """u, v (m, 2) of points on primitives, and how fast each changes along the surface (m, 2), 1 / length."""
     uv, rate = np.empty((len(prim), 2)), np.empty((len(prim), 2))
     mesh = prim < prims.triangle_count
@@ -45,8 +45,8 @@ def _coordinates(prims: Primitives, prim: IndexArray, point: FloatArray) -> tupl
     return uv, rate
 
 
-def _looked_up(texture: Texture, uv: FloatArray) -> FloatArray:
-    """(m, 3) linear colours at uv (m, 2)."""
+def looked_up(texture: Texture, uv: FloatArray) -> FloatArray:
+    """(m, 4) linear colours and alpha at uv (m, 2)."""
     height, width = texture.picture.texels.shape[:2]
     place = np.stack([uv[:, 0] * width, (1.0 - uv[:, 1]) * height], axis=1)
     if not texture.linear:
@@ -62,15 +62,15 @@ def _looked_up(texture: Texture, uv: FloatArray) -> FloatArray:
 
 
 def _texel(texture: Texture, x: FloatArray, y: FloatArray) -> FloatArray:
-    """(m, 3) linear colours of the texels x, y (m,), whole numbers of any size."""
+    """(m, 4) linear colours and alpha of the texels x, y (m,), whole numbers of any size. Alpha is never encoded."""
     texels = texture.picture.texels
     height, width = texels.shape[:2]
-    code = texels[_wrapped(y, height, texture.wrap), _wrapped(x, width, texture.wrap), :3]
-    value = code / float(np.iinfo(texels.dtype).max)
+    code = texels[_wrapped(y, height, texture.wrap), _wrapped(x, width, texture.wrap)]
+    value: FloatArray = code / float(np.iinfo(texels.dtype).max)
     if not texture.srgb:
         return value
-    decoded: FloatArray = np.where(value <= 0.04045, value / 12.92, np.power((value + 0.055) / 1.055, 2.4))
-    return decoded
+    value[:, :3] = np.where(value <= 0.04045, value / 12.92, np.power((value + 0.055) / 1.055, 2.4))[:, :3]
+    return value
 
 
 def _wrapped(i: FloatArray, size: int, wrap: str) -> IndexArray:
@@ -82,7 +82,7 @@ def _wrapped(i: FloatArray, size: int, wrap: str) -> IndexArray:
     return np.where(turned < size, turned, 2 * size - 1 - turned).astype(np.int64)
 
 
-def _from_jumps(texture: Texture, uv: FloatArray, rate: FloatArray, on_sphere: NDArray[np.bool_]) -> FloatArray:
+def from_jumps(texture: Texture, uv: FloatArray, rate: FloatArray, on_sphere: NDArray[np.bool_]) -> FloatArray:
     """(m,) lengths along the surface to where the colour jumps: between texels not mixed; where longitudes meet without repeating."""
     height, width = texture.picture.texels.shape[:2]
     away = np.full(len(uv), np.inf)

@@ -6,6 +6,7 @@ It follows docs/conventions.md to the letter and shares no code with the devices
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,8 @@ from clrt.reference.environment import behind
 from clrt.reference.geometry import MaterialTable, Primitives
 from clrt.reference.lights import lights_of
 from clrt.reference.lines import TILE_BYTES
+from clrt.reference.normalmap import tilted
+from clrt.reference.opacity import SceneCover
 from clrt.reference.shade import Surface, local_color, surfaces
 from clrt.reference.texture import tints
 from clrt.reference.visibility import closest
@@ -38,7 +41,7 @@ class ReferencePicture:
     t : (h, w) float64, where: eye + t * direction, direction as given; inf for none
     margin : (h, w) float64, the smallest distance to a flipped decision over all rays of the pixel, in relative errors: rounding with a
         unit roundoff well below it (say by a factor of 100) cannot change what the pixel's rays hit. inf: above BAND = 1e-3
-    rays : how many rays were traced, by kind: primary, shadow, reflected, refracted
+    rays : how many rays were traced, by kind: primary, shadow, reflected, refracted, passed
     """
 
     pixels: FloatArray
@@ -66,6 +69,7 @@ class _World:
     materials: MaterialTable
     rank: IndexArray
     absorption: FloatArray
+    cover: SceneCover
     tile_bytes: int
 
     @classmethod
@@ -73,7 +77,7 @@ class _World:
         prims, materials = Primitives.build(scene), MaterialTable.build(scene)
         # Without depth no light goes through glass, and media are not followed.
         absorption = media.absorption(prims, materials) * (scene.depth > 0)
-        return cls(scene, prims, materials, media.ranks(prims, materials), absorption, tile_bytes)
+        return cls(scene, prims, materials, media.ranks(prims, materials), absorption, SceneCover.of(scene), tile_bytes)
 
     @property
     def walls_may_coincide(self) -> bool:
@@ -113,7 +117,7 @@ def render(
     first = world.first_media()
     picture = ReferencePicture(
         np.zeros((height * width, 3)), np.full(height * width, -1, np.int64), np.full(height * width, np.inf),
-        np.full(height * width, np.inf), dict.fromkeys(("primary", "shadow", "reflected", "refracted"), 0),
+        np.full(height * width, np.inf), dict.fromkeys(("primary", "shadow", "reflected", "refracted", "passed"), 0),
     )  # fmt: skip
     for start in range(0, height * width, PIXELS_AT_ONCE):
         pixel = np.arange(start, min(start + PIXELS_AT_ONCE, height * width))
@@ -148,16 +152,22 @@ def _trace(world: _World, wave: _Wave, picture: ReferencePicture, depth: int) ->
     np.add.at(picture.pixels, wave.pixel[missed], wave.weight[missed, None] * left[missed] * color)
     np.minimum.at(picture.margin, wave.pixel[missed], margin)
     wave, prim, t = _select(wave, hit), prim[hit], t[hit]
-    surface = surfaces(world.prims, wave.rays, prim, t)
+    surface = tilted(world.scene, world.prims, surfaces(world.prims, wave.rays, prim, t))
+    solid, edges = world.cover.solid(world.prims, surface)
+    np.minimum.at(picture.margin, wave.pixel, edges)
+    straight = replace(wave, weight=wave.weight * (1.0 - solid))
+    wave = replace(wave, weight=wave.weight * solid)
     color, margin, shadow_rays = local_color(
-        world.prims, world.materials, lights_of(world.scene), surface, wave.weight, world.tile_bytes
+        world.prims, world.materials, lights_of(world.scene), surface, wave.weight, world.tile_bytes, world.cover
     )
     picture.rays["shadow"] += shadow_rays
     tint, sharpness = tints(world.scene, world.prims, surface)
     color, margin = color * tint, np.minimum(margin, sharpness)
     np.add.at(picture.pixels, wave.pixel, wave.weight[:, None] * wave.tint * color)
     np.minimum.at(picture.margin, wave.pixel, margin)
-    return _next(world, wave, surface, t, picture) if depth < world.scene.depth else _select(wave, np.zeros(0, np.int64))
+    if depth == world.scene.depth:
+        return _select(wave, np.zeros(0, np.int64))
+    return _joined(_next(world, wave, surface, t, picture), _passed(straight, surface, picture))
 
 
 def _select(wave: _Wave, rows: IndexArray) -> _Wave:
@@ -183,3 +193,22 @@ def _next(world: _World, wave: _Wave, surface: Surface, t: FloatArray, picture: 
     stack = MediumStack(*(np.concatenate([getattr(above, n), getattr(behind, n)]) for n in ("object", "ior", "rank", "count")))
     rays = Rays(surface.point[both], direction, surface.prim[both], pos_err, dir_err)
     return _Wave(rays, weight, wave.pixel[both], stack, wave.tint[both])
+
+
+def _passed(wave: _Wave, surface: Surface, picture: ReferencePicture) -> _Wave:
+    """The rays that go straight on from their hits, in the media that they are in, those of weight 0 left out."""
+    rows = np.flatnonzero(wave.weight)
+    picture.rays["passed"] += len(rows)
+    passed = _select(wave, rows)
+    rays = Rays(surface.point[rows], -surface.view[rows], surface.prim[rows], surface.spread_err[rows], surface.dir_err[rows])
+    return replace(passed, rays=rays)
+
+
+def _joined(first: _Wave, second: _Wave) -> _Wave:
+    def both(a: object, b: object, *names: str) -> list[Any]:
+        return [np.concatenate([getattr(a, name), getattr(b, name)]) for name in names]
+
+    rays = Rays(*both(first.rays, second.rays, "origin", "direction", "own", "pos_err", "dir_err"))
+    stack = MediumStack(*both(first.stack, second.stack, "object", "ior", "rank", "count"))
+    weight, pixel, tint = both(first, second, "weight", "pixel", "tint")
+    return _Wave(rays, weight, pixel, stack, tint)

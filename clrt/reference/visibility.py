@@ -33,23 +33,29 @@ def closest(prims: Primitives, rays: Rays, tile_bytes: int) -> tuple[IndexArray,
 
 def occluded(prims: Primitives, segments: Rays, tile_bytes: int) -> tuple[BoolArray, FloatArray]:
     """Does anything but its own primitive meet the open segment (0 < t < 1)? (m,) bool, and the margin (m,)."""
-    found = find_crossings(prims, segments, tile_bytes)
-    blocks = found.ahead & found.short
+    found, blocks, firmness, nearest = blockers(prims, segments, tile_bytes)
     blocked = np.zeros(len(segments.own), np.bool_)
     blocked[found.ray[blocks]] = True
-    start, end = _gap_margins(segments, found)
-    # One firm blocker is enough: the firmest decides.
-    firmness = np.minimum(np.minimum(found.boundary.min(axis=1, initial=np.inf), start), end)
+    # One firm blocker is enough: the firmest decides. Where nothing blocks, the nearest to blocking does.
     firmest = np.zeros(len(segments.own))
     np.maximum.at(firmest, found.ray[blocks], firmness[blocks])
-    # Where nothing blocks, the nearest to blocking decides.
+    return blocked, np.where(blocked, firmest, nearest)
+
+
+def blockers(prims: Primitives, segments: Rays, tile_bytes: int) -> tuple[Crossings, BoolArray, FloatArray, FloatArray]:
+    """What meets open segments, or nearly does: k crossings, whether each meets its segment (k,), how firmly (k,); and how near the
+    nearest of those that do not is to meeting each segment (m,)."""
+    found = find_crossings(prims, segments, tile_bytes)
+    blocks = found.ahead & found.short
+    start, end = _gap_margins(segments, found)
+    firmness = np.minimum(np.minimum(found.boundary.min(axis=1, initial=np.inf), start), end)
     unit = segments.pos_err + segments.speed
     beyond = _lag(found.depth, np.ones(len(unit)), segments.speed / unit, found.ray)
     miss = np.maximum(found.boundary, beyond).min(axis=1, initial=np.inf)
     needed = np.where(found.meets, np.maximum(np.where(found.ahead, 0.0, start), np.where(found.short, 0.0, end)), miss)
     nearest = search_band(prims, segments)[1]
-    np.minimum.at(nearest, found.ray, needed)
-    return blocked, np.where(blocked, firmest, nearest)
+    np.minimum.at(nearest, found.ray[~blocks], needed[~blocks])
+    return found, blocks, firmness, nearest
 
 
 def _first(prims: Primitives, rays: Rays, found: Crossings, hits: IndexArray) -> IndexArray:
