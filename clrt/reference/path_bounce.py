@@ -9,9 +9,10 @@ from clrt.reference import media
 from clrt.reference.bounce import Bounces, MediumStack, Walls, bounces
 from clrt.reference.crossings import Rays
 from clrt.reference.lines import TILE_BYTES
+from clrt.reference.path_glass import through_rough_glass
 from clrt.reference.path_lights import uniform_sphere
 from clrt.reference.path_microfacet import drawn_facets
-from clrt.reference.path_surfaces import matte, polished, shiny
+from clrt.reference.path_surfaces import facet_normal, matte, polished, shiny
 from clrt.reference.path_world import Generator, PathWorld, Wave, surface_rows
 from clrt.reference.shade import Surface, dot
 
@@ -24,10 +25,11 @@ def next_rays(world: PathWorld, wave: Wave, surface: Surface, color: FloatArray,
     """All rays that the hits send on, each with the weight of what it stands for."""
     ids = surface.material
     b = _bounces(world, wave, surface, t)
-    smooth = world.gloss[ids] == 0.0
+    smooth = (world.gloss[ids] == 0.0) & ~world.metal_rough[ids]
     waves = [_sent(wave, surface, b.reflected, b.reflect_weight * smooth, wave.stack),
              _sent(wave, surface, b.refracted, b.refract_weight * smooth, b.behind)]  # fmt: skip
     waves.append(_mirrored_by_facets(world, wave, surface, color, rng))
+    waves.extend(through_rough_glass(world, wave, surface, b, rng))
     if world.scene.indirect is not None:
         waves.append(_scattered(world, wave, surface, color, rng))
     return Wave.join(waves)
@@ -56,9 +58,10 @@ def _drawn(ray: Wave, surface: Surface, direction: FloatArray, f_cos: FloatArray
 def _mirrored_by_facets(world: PathWorld, wave: Wave, surface: Surface, color: FloatArray, rng: Generator) -> Wave:
     """Rays for the lobes of gloss and of metal-rough materials: a facet is drawn by D cos, its density by directions is D cos / (4 v.h)."""
     ids = surface.material
-    rows = np.flatnonzero(world.metal_rough[ids] | ((world.gloss[ids] > 0.0) & (world.materials.reflect[ids] > 0.0)))
+    mirror = (world.gloss[ids] > 0.0) & (world.materials.reflect[ids] > 0.0) & (world.materials.refract[ids] == 0.0)
+    rows = np.flatnonzero(world.metal_rough[ids] | mirror)
     part, ray = surface_rows(surface, rows), wave.take(rows)
-    facet, density = drawn_facets(part.n_shade, world.alpha[part.material], rng)
+    facet, density = drawn_facets(facet_normal(part), world.alpha[part.material], rng)
     v_h = dot(part.view, facet)
     direction = 2.0 * v_h[:, None] * facet - part.view
     density = np.where(v_h > 0.0, density / (4.0 * np.where(v_h > 0.0, v_h, 1.0)), 0.0)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from clrt.reference.path_hits import beyond_face
 from clrt.reference.path_lights import Incoming, arriving, from_areas, from_environment, from_points, from_suns
-from clrt.reference.path_microfacet import albedo, lobe
+from clrt.reference.path_microfacet import albedo, diffuse_grazing, grazing, lobe
 from clrt.reference.path_world import Generator, PathWorld, Wave
 from clrt.reference.shade import Surface, dot
 
@@ -20,49 +20,57 @@ DIELECTRIC = 0.04  #: what a metal-rough surface that is no metal reflects strai
 def matte(world: PathWorld, surface: Surface, color: FloatArray, direction: FloatArray) -> FloatArray:
     """f cos (m, 3) of what scatters light all over the place: Phong's lobe, and the diffuse one of metal-rough materials.
 
-    The latter is (1 - F) (1 - metallic) C / pi, with F of the facet between both directions.
+    The latter is (1 - F) (1 - metallic) C S N.L / pi, with F of the facet between both directions and S = min(1, (1 - B) / (1 - K)).
     """
     result = phong(world, surface, color, direction)
     rows = np.flatnonzero(world.metal_rough[surface.material] & beyond_face(surface, direction))
-    ids = surface.material[rows]
-    shine, _ = _reflectance(world, surface, color, rows, direction[rows])
-    share = (1.0 - world.metallic[ids]) * dot(surface.n_shade[rows], direction[rows]) / np.pi
-    result[rows] = (1.0 - shine) * color[rows] * share[:, None]
+    ids, view, n = surface.material[rows], surface.view[rows], facet_normal(surface)[rows]
+    shine = _schlick(world, surface, color, rows, direction[rows])
+    share = np.minimum(1.0, (1.0 - grazing(dot(n, view), world.alpha[ids])) / (1.0 - diffuse_grazing(dot(n, view))))
+    strength = (1.0 - world.metallic[ids]) * share * dot(surface.n_shade[rows], direction[rows]) / np.pi
+    result[rows] = (1.0 - shine) * color[rows] * strength[:, None]
     return result
 
 
 def shiny(world: PathWorld, surface: Surface, color: FloatArray, direction: FloatArray) -> FloatArray:
-    """f cos (m, 3) of the metal-rough materials' specular lobe: F D V (1 + F0 (1 / E - 1)), E the lobe's albedo with F = 1."""
+    """f cos (m, 3) of the metal-rough materials' specular lobe: F times the lobe over its albedo."""
     result = np.zeros_like(color)
-    rows = np.flatnonzero(world.metal_rough[surface.material] & beyond_face(surface, direction))
-    n, view, alpha = surface.n_shade[rows], surface.view[rows], world.alpha[surface.material[rows]]
-    shine, straight = _reflectance(world, surface, color, rows, direction[rows])
-    value, _ = lobe(view, n, direction[rows], alpha)
-    lost = 1.0 / albedo(dot(n, view), alpha) - 1.0
-    result[rows] = shine * (1.0 + straight * lost[:, None]) * value[:, None]
+    rows = np.flatnonzero(world.metal_rough[surface.material] & (dot(surface.n_geo, direction) > 0.0))
+    shine = _schlick(world, surface, color, rows, direction[rows])
+    result[rows] = shine * _whole_lobe(world, surface, rows, direction[rows])[:, None]
     return result
 
 
-def _reflectance(
-    world: PathWorld, surface: Surface, color: FloatArray, rows: IndexArray, direction: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Schlick's F (k, 3) of the facets that mirror the directions (k, 3) to the viewer, and F0 (k, 3)."""
+def polished(world: PathWorld, surface: Surface, direction: FloatArray) -> FloatArray:
+    """f cos (m, 3) of mirrors with gloss: Reflect times the lobe over its albedo. Rough glass is left to the rays that it sends on."""
+    value = np.zeros(len(direction))
+    mirror = (world.gloss > 0.0) & (world.materials.refract == 0.0)
+    rows = np.flatnonzero(mirror[surface.material] & (dot(surface.n_geo, direction) > 0.0))
+    value[rows] = world.materials.reflect[surface.material[rows]] * _whole_lobe(world, surface, rows, direction[rows])
+    return np.repeat(value[:, None], 3, axis=1)
+
+
+def facet_normal(surface: Surface) -> FloatArray:
+    """(m, 3) what facets are tilted from: N, or n_geo where N faces away from the viewer or mirrors the view to below the surface."""
+    facing = dot(surface.n_shade, surface.view)
+    mirrored = 2.0 * facing[:, None] * surface.n_shade - surface.view
+    return np.where(((facing > 0.0) & (dot(mirrored, surface.n_geo) > 0.0))[:, None], surface.n_shade, surface.n_geo)
+
+
+def _whole_lobe(world: PathWorld, surface: Surface, rows: IndexArray, direction: FloatArray) -> FloatArray:
+    """(k,) the lobe over its albedo, towards directions (k, 3)."""
+    n, view, alpha = facet_normal(surface)[rows], surface.view[rows], world.alpha[surface.material[rows]]
+    return np.asarray(lobe(view, n, direction, alpha) / albedo(dot(n, view), alpha))
+
+
+def _schlick(world: PathWorld, surface: Surface, color: FloatArray, rows: IndexArray, direction: FloatArray) -> FloatArray:
+    """F (k, 3) of the facets that mirror the directions (k, 3) to the viewer (Schlick 1994)."""
     metallic = world.metallic[surface.material[rows]][:, None]
     straight = DIELECTRIC * (1.0 - metallic) + color[rows] * metallic
     half = surface.view[rows] + direction
     half = half / np.maximum(np.linalg.norm(half, axis=1, keepdims=True), 1e-300)
     cosine = np.clip(dot(surface.view[rows], half), 0.0, 1.0)
-    return straight + (1.0 - straight) * (1.0 - cosine[:, None]) ** 5, straight
-
-
-def polished(world: PathWorld, surface: Surface, direction: FloatArray) -> FloatArray:
-    """f cos (m, 3) of `gloss`: Reflect times the lobe over its albedo, so that all that a polished mirror would hand on is handed on."""
-    materials, ids = world.materials, surface.material
-    value = np.zeros(len(ids))
-    rows = np.flatnonzero((world.gloss[ids] > 0.0) & beyond_face(surface, direction))
-    n, view, alpha = surface.n_shade[rows], surface.view[rows], world.alpha[ids[rows]]
-    value[rows] = materials.reflect[ids[rows]] * lobe(view, n, direction[rows], alpha)[0] / albedo(dot(n, view), alpha)
-    return np.repeat(value[:, None], 3, axis=1)
+    return np.asarray(straight + (1.0 - straight) * (1.0 - cosine[:, None]) ** 5)
 
 
 def phong(world: PathWorld, surface: Surface, color: FloatArray, direction: FloatArray) -> FloatArray:
