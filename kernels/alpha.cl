@@ -1,5 +1,5 @@
 // Provides: alpha_at: the alpha of a picture at its coordinates, which multiplies opacity.
-// Needs: texture.cl, opaque.cl, structs.  Reads: nothing.
+// Needs: texture.cl, structs.  Reads: nothing.
 
 HOT real alpha_texel(global const Texture *texture, global const uchar *texels, int x, int y) {
     const long code = 4 * ((long)y * texture->width + x) + 3;

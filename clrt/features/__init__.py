@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from clrt.features import camera, cutouts, helpers, lamps, rough, sampled, shapes, surfaces, surroundings
+from clrt.features import camera, cutouts, helpers, lamps, placed, motion, rough, sampled, shapes, surfaces, surroundings
 from clrt.features.feature import REAL, Calls, Feature
 from clrt.scene.model import Scene
 
@@ -22,21 +22,31 @@ __all__ = ["FEATURES", "HELPERS", "REAL", "Feature", "Features"]
 FEATURES: tuple[Feature, ...] = (
     helpers.SAMPLER,
     camera.LENS,
+    motion.SHUTTER,
+    motion.EYE_MOTION,
     helpers.SAMPLING,
     camera.SAMPLES,
     helpers.WIDE_EYE,
     helpers.PATH,
+    placed.INSTANCES,
+    placed.PLACED,
+    placed.OBJECT_TREE,
     shapes.SPHERES,
     shapes.SMOOTH,
+    placed.PLACED_SMOOTH,
+    placed.PLACED_BACK,
     cutouts.GLOBE,
     cutouts.PICTURES,
     cutouts.NORMAL_GLOBE,
     cutouts.NORMAL_MAP,
-    cutouts.OPACITY,
     cutouts.ALPHA,
+    cutouts.OPACITY,
     cutouts.OPACITY_SPHERE,
     cutouts.AFTER,
     cutouts.OPACITY_SHADOWS,
+    helpers.FACETS,
+    rough.METAL_ROUGH,
+    rough.METAL_MAP,
     lamps.SHADOWS,
     lamps.DIRECT_LIGHT,
     lamps.SPOT,
@@ -44,7 +54,6 @@ FEATURES: tuple[Feature, ...] = (
     helpers.REACH,
     lamps.SUN_SHADOWS,
     lamps.SUN,
-    helpers.FACETS,
     rough.GLOSS,
     surfaces.FRESNEL,
     surfaces.REFRACTION,
@@ -62,8 +71,12 @@ FEATURES: tuple[Feature, ...] = (
     helpers.MIS,
     sampled.INDIRECT,
     sampled.CLAMP,
+    rough.METAL_RAY,
+    helpers.METAL_INDIRECT,
     helpers.SCATTER,
     helpers.GLOSS_LIGHT,
+    helpers.METAL_LIGHT,
+    helpers.METAL_MIS,
     surroundings.ENVIRONMENT_LIGHT,
     surroundings.ENVIRONMENT_SHADOWS,
     helpers.ENVIRONMENT_MIS,
