@@ -110,7 +110,8 @@ HOT void arealight_light(const Geometry *geometry, global const Frame *frame, gl
     lit &= wanted;
     if (!any_lane(lit)) return;
     for (int a = 0; a < 3; a++) power[a] = choose(lit, load_lanes(light + a * LANES) / chance, (real_n)0);
-    const real_n t_max = distance * (R(1.0) - R(16.0) * UNIT_ROUNDOFF) - load_lanes(short_by) - hit->error;
+    real_n end[3];
+    for (int a = 0; a < 3; a++) end[a] = load_lanes(at + a * LANES);
     //@ arealight_visible
     //@ scatter_lit
     amount = choose(lit, amount, (real_n)0);

@@ -2,6 +2,5 @@
 // Needs: arealight.cl, reach.cl.  Reads: nothing.
 
 //@hook arealight_visible
-    lit &= is_greater(t_max, (real_n)0);
-    lit = reach_clear(geometry, rays, hit, to_light, t_max, from_eye, frame->extent, lit);
+    lit = reach_point(geometry, rays, hit, to_light, end, load_lanes(short_by), from_eye, frame->extent, lit);
 //@end

@@ -2,5 +2,5 @@
 // Needs: environment_light.cl, reach.cl.  Reads: nothing.
 
 //@hook environment_visible
-    lit = reach_clear(geometry, rays, hit, to_light, (real_n)INFINITY, from_eye, frame->extent, lit);
+    lit = reach_clear(geometry, rays, hit, to_light, from_eye, frame->extent, lit);
 //@end

@@ -1,10 +1,10 @@
-// Provides: reach_clear: which hit points see as far as to `t_max` in a direction.
+// Provides: reach_clear: which hit points see all the way in a direction; reach_point: which see a point.
 // Needs: scene.cl, hit.cl, structs.  Reads: nothing.
 
 // Rays from the points, as reflected ones are: they start off the surface by the point's error and pass by the triangle that they start on;
-// the first thing they meet settles it. `t_max` is infinite, or short of where they end by the error there.
-HOT mask_n reach_clear(const Geometry *geometry, const Rays *rays, const Hit *hit, const real_n *to_light, real_n t_max, const int from_eye,
-                       real extent, mask_n lit) {
+// the first thing they meet settles it. With `ends`, they end at `end`, short of it by `short_by`, the error there along the way; else nowhere.
+HOT mask_n reach_trace(const Geometry *geometry, const Rays *rays, const Hit *hit, const real_n *to_light, const int ends, const real_n *end,
+                       real_n short_by, const int from_eye, real extent, mask_n lit) {
     Rays towards;
     real_n start[3] = {hit->point[0], hit->point[1], hit->point[2]}, error = hit->error;
     mask_n own = load_lanes(hit->slot);
@@ -12,6 +12,15 @@ HOT mask_n reach_clear(const Geometry *geometry, const Rays *rays, const Hit *hi
     for (int a = 0; a < 3; a++) {
         towards.origin[a] = choose(lit, multiply_add(hit->geometric[a], error, start[a]), (real_n)0);
         towards.direction[a] = to_light[a];
+    }
+    real_n t_max = (real_n)INFINITY;
+    if (ends) {
+        // From where the ray does start: its end is `end`, not a point beside it.
+        for (int a = 0; a < 3; a++) towards.direction[a] = choose(lit, end[a] - towards.origin[a], (real_n)1);
+        const real_n length = sqrt(dot_n(towards.direction, towards.direction));
+        for (int a = 0; a < 3; a++) towards.direction[a] /= length;
+        t_max = length * (R(1.0) - R(16.0) * UNIT_ROUNDOFF) - short_by;
+        lit &= is_greater(t_max, (real_n)0);
     }
     towards.t_min = (real_n)0;
     towards.t_max = t_max;
@@ -27,6 +36,16 @@ HOT mask_n reach_clear(const Geometry *geometry, const Rays *rays, const Hit *hi
     //@counting count_rays(geometry->counters, COUNT_SHADOW, towards.active);
     //@ reach_blocked
     return lit & is_less(hits.slot, NO_LANES);
+}
+
+HOT mask_n reach_clear(const Geometry *geometry, const Rays *rays, const Hit *hit, const real_n *to_light, const int from_eye, real extent,
+                       mask_n lit) {
+    return reach_trace(geometry, rays, hit, to_light, 0, to_light, (real_n)0, from_eye, extent, lit);
+}
+
+HOT mask_n reach_point(const Geometry *geometry, const Rays *rays, const Hit *hit, const real_n *to_light, const real_n *end, real_n short_by,
+                       const int from_eye, real extent, mask_n lit) {
+    return reach_trace(geometry, rays, hit, to_light, 1, end, short_by, from_eye, extent, lit);
 }
 
 //@hook sphere_meets

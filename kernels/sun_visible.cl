@@ -2,5 +2,5 @@
 // Needs: sun.cl, reach.cl.  Reads: nothing.
 
 //@hook sun_visible
-        lit = reach_clear(geometry, rays, hit, to_light, (real_n)INFINITY, from_eye, extent, lit);
+        lit = reach_clear(geometry, rays, hit, to_light, from_eye, extent, lit);
 //@end
