@@ -11,7 +11,7 @@ typedef PASTE(double, LANES) double_n;
 #define to_double_n(x) PASTE(convert_double, LANES)(x)
 #endif
 
-HOT void instance_rays(global const Placement *from, const Rays *rays, Rays *local, real_n *length) {
+HOT void instance_rays(global const Placement *from, const Rays *rays, Rays *inner, real_n *length) {
     double_n origin[3], direction[3];
     for (int a = 0; a < 3; a++) {
         origin[a] = to_double_n(rays->origin[a]);
@@ -19,12 +19,12 @@ HOT void instance_rays(global const Placement *from, const Rays *rays, Rays *loc
     }
     for (int a = 0; a < 3; a++) {
         global const double *row = from->object_from_world + 4 * a;
-        local->origin[a] = to_real_n(row[0] * origin[0] + row[1] * origin[1] + row[2] * origin[2] + row[3]);
-        local->direction[a] = to_real_n(row[0] * direction[0] + row[1] * direction[1] + row[2] * direction[2]);
+        inner->origin[a] = to_real_n(row[0] * origin[0] + row[1] * origin[1] + row[2] * origin[2] + row[3]);
+        inner->direction[a] = to_real_n(row[0] * direction[0] + row[1] * direction[1] + row[2] * direction[2]);
     }
-    *length = sqrt(dot_n(local->direction, local->direction));
+    *length = sqrt(dot_n(inner->direction, inner->direction));
     const real_n scale = R(1.0) / *length;
-    for (int a = 0; a < 3; a++) local->direction[a] *= scale;
+    for (int a = 0; a < 3; a++) inner->direction[a] *= scale;
 }
 
 HOT void instance_point(global const Placement *from, double *at) {
@@ -62,7 +62,7 @@ HOT void instance_to_world(global const Placement *from, real v[3][LANES], const
 }
 
 //@hook placed_enter
-        instance_rays(from, rays, &local, &length);
+        instance_rays(from, rays, &inner, &length);
 //@end
 //@hook placed_point
         instance_point(from, at);

@@ -20,7 +20,7 @@ HOT void placed_trace(const Geometry *geometry, const int place, const Rays *ray
     const int number = place < geometry->object_count ? -1 : place - geometry->object_count;
     int b = place;
     Geometry seen = *geometry;
-    Rays local = *rays;
+    Rays inner = *rays;
     Hits found = *hits;
     real_n length = (real_n)1;
     if (number >= 0) {
@@ -28,14 +28,15 @@ HOT void placed_trace(const Geometry *geometry, const int place, const Rays *ray
         b = from->object;
         for (int a = 0; a < 3; a++) seen.local_origin[a] = geometry->object_origins[3 * b + a];
         //@ placed_enter
-        local.t_min = rays->t_min * length;
-        local.t_max = rays->t_max * length;
+        //@ placed_moved
+        inner.t_min = rays->t_min * length;
+        inner.t_max = rays->t_max * length;
         found.t = hits->t * length;
-        rays_prepare(&local, R(0.0));
+        rays_prepare(&inner, R(0.0));
     }
-    local.skip = choose(is_equal(rays->skip_place, (mask_n)number), rays->skip, (mask_n)-1);
+    inner.skip = choose(is_equal(rays->skip_place, (mask_n)number), rays->skip, (mask_n)-1);
     found.slot = (mask_n)-1;
-    placed_leaf(&seen, b, &local, active & local.active, any_hit, &found);
+    placed_leaf(&seen, b, &inner, active & inner.active, any_hit, &found);
     const mask_n hit = is_at_least(found.slot, NO_LANES);
     found.t = choose(hit, found.t / length, hits->t);
     found.slot = choose(hit, found.slot, hits->slot);
@@ -44,7 +45,7 @@ HOT void placed_trace(const Geometry *geometry, const int place, const Rays *ray
 }
 
 // The hits' points, relative to the objects' origins; those of others as they are.
-HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit, real_n *local) {
+HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit, real_n *inner) {
     real point[3][LANES];
     for (int a = 0; a < 3; a++) store_lanes(hit->point[a], point[a]);
     //@ placed_lanes
@@ -53,9 +54,10 @@ HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit
         global const Placement *from = geometry->placements + hit->place[k];
         double at[3] = {point[0][k], point[1][k], point[2][k]};
         //@ placed_point
+        //@ placed_point_moved
         for (int a = 0; a < 3; a++) point[a][k] = (real)at[a];
     }
-    for (int a = 0; a < 3; a++) local[a] = load_lanes(point[a]);
+    for (int a = 0; a < 3; a++) inner[a] = load_lanes(point[a]);
 }
 
 //@hook geometry_members
@@ -167,9 +169,9 @@ HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit
     }
 //@end
 //@hook texture_where
-    real_n local[3];
-    placed_local(geometry, rays, hit, local);
-    for (int a = 0; a < 3; a++) store_lanes(local[a], where + a * LANES);
+    real_n inner[3];
+    placed_local(geometry, rays, hit, inner);
+    for (int a = 0; a < 3; a++) store_lanes(inner[a], where + a * LANES);
 //@end
 //@hook texture_point
         // Where an object's own origin is another, points are relative to that.

@@ -16,8 +16,9 @@ HOT void placed_back(const Geometry *geometry, real_n t, real_n scale, Hit *hit)
         global const Placement *from = geometry->placements + hit->place[k];
         double stretch = 1, longest = 1;  // of the normal, and of any vector, on the way to the world and to the object
         //@ placed_normal
-        const double local = 2 * geometry->objects[from->object].extent + 3 * longest * way[k];
-        error[k] = (real)(16 * UNIT_ROUNDOFF * (local / stretch + size[k] + way[k]));
+        double inner = 2 * geometry->objects[from->object].extent + 3 * longest * way[k];
+        //@ placed_error
+        error[k] = (real)(16 * UNIT_ROUNDOFF * (inner / stretch + size[k] + way[k]));
     }
     for (int a = 0; a < 3; a++) {
         hit->geometric[a] = load_lanes(geometric[a]);

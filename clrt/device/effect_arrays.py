@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device import arrays_environment, arrays_rough, layout, texels
+from clrt.device import arrays_environment, arrays_placed, arrays_rough, layout, texels
 from clrt.device.arrays_emitters import emitters
 from clrt.device.packed import FloatArray, Packed
 from clrt.device.program import MEDIA_DEPTH, light_dtype
@@ -63,7 +63,7 @@ def _corner_normals(packed: Packed) -> NDArray[Any]:
     for item, order in zip(packed.scene.objects, packed.orders, strict=True):
         corners = item.vertex_normals if item.vertex_normals is not None else np.repeat(item.normals[:, None], 3, 1)
         parts.append(corners[order].astype(packed.real))
-    return np.concatenate(parts)
+    return np.concatenate([np.zeros((0, 3, 3), packed.real), *parts])
 
 
 def _media(packed: Packed) -> NDArray[np.int32]:
@@ -103,8 +103,10 @@ def _absorption(packed: Packed) -> NDArray[Any]:
 
 
 PACKERS: dict[str, Packer] = {
+    "placements": arrays_placed.placements, "object_origins": arrays_placed.object_origins, "object_tree": arrays_placed.object_tree,
     "emitters": emitters,
     "facet_albedos": arrays_rough.facet_albedos, "glass_albedos": arrays_rough.glass_albedos,
+    "diffuse_shares": arrays_rough.diffuse_shares,
     "lights": _lights, "suns": _suns, "spheres": _spheres, "corner_normals": _corner_normals, "media": _media, "absorption": _absorption,
     "sample_range": _sample_range, "sample_sums": _sample_sums,
     "environment_cells": arrays_environment.cells, "environment_rows": arrays_environment.rows,

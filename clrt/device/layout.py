@@ -90,6 +90,12 @@ def environment_row(real: type) -> np.dtype[np.void]:
     return struct_dtype([("top", np.float64), ("bottom", np.float64), ("density", real), ("begin", np.int32), ("lit", np.int32)])
 
 
+def placement(real: type) -> np.dtype[np.void]:
+    """An object seen through a transform (placed.cl): rows of it; the greatest that it stretches a vector by; which object; its medium."""
+    return struct_dtype([("object_from_world", np.float64, (12,)), ("motion", np.float64, (3,)), ("stretch", np.float64), ("object", np.int32),
+                         ("medium", np.int32)])  # fmt: skip
+
+
 def sphere(real: type) -> np.dtype[np.void]:
     """A sphere relative to the local origin, rounded, and as it is: centre and radius."""
     return struct_dtype([("given", np.float64, (4,)), ("center", real, (3,)), ("radius", real), ("material", np.int32)])

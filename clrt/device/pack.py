@@ -16,19 +16,23 @@ from numpy.typing import NDArray
 from clrt.device import layout
 from clrt.device.packed import FloatArray, Packed
 from clrt.device.program import frame_dtype, material_dtype
+from clrt.device.rounding import rounded_down, rounded_up
 from clrt.features import Features
 from clrt.kdtree.arrays import LEAF
 from clrt.kdtree.tree import KdTree
 from clrt.precision import Precision
 from clrt.scene.model import MeshObject, Scene
+from clrt.scene.placed import object_origins, placed_boxes, placements
 
 
 def local_origin(scene: Scene) -> FloatArray:
-    """The point coordinates are rounded relative to: the middle of all triangles, or of the smallest sphere where there are none.
+    """The point coordinates are rounded relative to: the middle of all triangles that are seen, or of the smallest sphere where there are none.
 
     A large sphere, such as a floor, does not move it: its centre is far from what is seen of it.
     """
-    boxes = [(o.vertices.min((0, 1)), o.vertices.max((0, 1))) for o in scene.objects if len(o)]
+    boxes = [(o.vertices.min((0, 1)), o.vertices.max((0, 1))) for o in scene.objects if len(o) and not o.hidden]
+    if scene.instances:
+        boxes += zip(*placed_boxes(scene, placements(scene), points=0.0), strict=True)
     if boxes:
         lo = np.min([b[0] for b in boxes], 0)
         hi = np.max([b[1] for b in boxes], 0)
@@ -36,6 +40,11 @@ def local_origin(scene: Scene) -> FloatArray:
     if len(scene.spheres):
         return np.array(scene.spheres.centers[scene.spheres.radii.argmin()])
     return np.zeros(3)
+
+
+def tree_origins(scene: Scene) -> FloatArray:
+    """(objects, 3): the point that the coordinates of each object's tree are relative to."""
+    return object_origins(scene, local_origin(scene))
 
 
 def leaf_order(tree: KdTree, triangles: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -70,14 +79,14 @@ def unit_normals(vertices: FloatArray) -> FloatArray:
 
 
 def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: Precision) -> Packed:
-    """All arrays of a scene. `trees[i]` is the tree of `scene.objects[i]`, over vertices less `local_origin(scene)`."""
+    """All arrays of a scene. `trees[i]` is the tree of `scene.objects[i]`, over vertices less its row of `tree_origins(scene)`."""
     real, origin = precision.real, local_origin(scene)
     nodes, indices, orders = [], [], []
     objects = np.zeros(len(trees), layout.object_record(real))
     node = index = slot = 0
     for number, (item, tree) in enumerate(zip(scene.objects, trees, strict=True)):
         order, slots = leaf_order(tree, len(item))
-        objects[number] = _object_record(item, tree, origin, node, real)
+        objects[number] = _object_record(item, tree, node, real)
         nodes.append(nodes_of(tree, node, index))
         indices.append((slots[tree.indices] + slot).astype(np.int32))
         orders.append(order)
@@ -96,6 +105,7 @@ def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: P
         frame=_frame(scene, origin, objects, len(vertices), features, precision),
         prim_ids=_prim_ids(scene, orders),
         orders=tuple(orders),
+        origins=object_origins(scene, origin),
         real=real,
         features=features,
     )
@@ -105,23 +115,14 @@ def _prim_ids(scene: Scene, orders: Sequence[NDArray[np.int64]]) -> NDArray[np.i
     return np.concatenate([o.first_prim + k for o, k in zip(scene.objects, orders, strict=True)] or [np.zeros(0, np.int64)])
 
 
-def _object_record(item: MeshObject, tree: KdTree, origin: FloatArray, root: int, real: type[np.floating]) -> NDArray[np.void]:
+def _object_record(item: MeshObject, tree: KdTree, root: int, real: type[np.floating]) -> NDArray[np.void]:
     record = np.zeros((), layout.object_record(real))
-    record["lo"], record["hi"] = _down(tree.lo, real), _up(tree.hi, real)
+    record["lo"], record["hi"] = rounded_down(tree.lo, real), rounded_up(tree.hi, real)
     edges = np.abs(item.vertices[:, [1, 2, 0]] - item.vertices).sum(2)
     reach = np.maximum(np.abs(tree.lo), np.abs(tree.hi)).sum() + edges.max(initial=0.0)
-    record["extent"] = _up(np.asarray(reach), real)
+    record["extent"] = rounded_up(np.asarray(reach), real)
     record["root"] = root
     return record
-
-
-def _down(values: FloatArray, real: type[np.floating]) -> NDArray[Any]:
-    rounded = values.astype(real)
-    return np.where(rounded > values, np.nextafter(rounded, real(-np.inf)), rounded)
-
-
-def _up(values: FloatArray, real: type[np.floating]) -> NDArray[Any]:
-    return -_down(-values, real)
 
 
 def _surfaces(scene: Scene, orders: Sequence[NDArray[np.int64]], vertices: FloatArray, real: type[np.floating]) -> NDArray[np.void]:
@@ -139,7 +140,8 @@ def _surfaces(scene: Scene, orders: Sequence[NDArray[np.int64]], vertices: Float
 def _materials(scene: Scene, features: Features, precision: Precision) -> NDArray[np.void]:
     dtype = material_dtype(features, precision)
     records = np.zeros(len(scene.materials), dtype)
-    for i, material in enumerate(scene.materials):
+    for i, given in enumerate(scene.materials):
+        material = given.without_phong() if given.metal_rough else given
         for member in dtype.names or ():
             records[member][i] = getattr(material, member)
     return records

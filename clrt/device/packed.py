@@ -19,6 +19,7 @@ class Packed:
 
     nodes (m, 2) int32; indices (r,) int32 slots; vertices (s, 3, 3) float64 as given; objects, surfaces, materials, frame: structs
     prim_ids : (s,) int64 primitive id of each slot
+    origins : (objects, 3) float64, what the coordinates of each object are relative to: `origin`, but for hidden ones
     """
 
     scene: Scene
@@ -31,6 +32,7 @@ class Packed:
     materials: NDArray[np.void]
     frame: NDArray[np.void]
     prim_ids: NDArray[np.int64]
+    origins: FloatArray
     orders: tuple[NDArray[np.int64], ...]
     real: type[np.floating]
     features: Features
@@ -38,3 +40,16 @@ class Packed:
     @property
     def slots(self) -> int:
         return len(self.vertices)
+
+    @property
+    def runs(self) -> list[tuple[FloatArray, int, int]]:
+        """Origin, first and last slot but one of objects in a row that share their origin."""
+        ends = np.cumsum([len(order) for order in self.orders]).tolist()
+        found: list[tuple[FloatArray, int, int]] = []
+        for origin, end in zip(self.origins, ends, strict=True):
+            first = found[-1][2] if found else 0
+            if found and (found[-1][0] == origin).all():
+                found[-1] = (origin, found[-1][1], end)
+            elif end > first:
+                found.append((origin, first, end))
+        return found

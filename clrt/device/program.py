@@ -58,11 +58,13 @@ class Shape:
     stack : entries of the traversal stack, at least the depth of the deepest tree
     depth : greatest number of bounces
     shared_lights : whether edge planes as seen from the lights are at hand
+    tree : entries of the stack of the tree over boxes, at least its depth
     """
 
     stack: int
     depth: int = 0
     shared_lights: bool = True
+    tree: int = 8
 
 
 def bounce_stack(features: Features, depth: int) -> int:
@@ -99,7 +101,7 @@ def _structs(features: Features, precision: Precision, entry: str) -> str:
     declared = " ".join(declaration for f in features.active for _, declaration in f.parameters)
     optional = (
         ("Light", partial(light_dtype, features)), ("Sphere", layout.sphere), ("Texture", layout.texture), ("Sun", layout.sun),
-        ("Emitter", layout.emitter), ("EnvironmentRow", layout.environment_row),
+        ("Emitter", layout.emitter), ("Placement", layout.placement), ("EnvironmentRow", layout.environment_row),
     )  # fmt: skip
     names += [(name, make(real)) for name, make in optional if f" {name} " in declared]
     if entry == "cast":
@@ -130,6 +132,8 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
         values["SHADOW_SHARED_ORIGIN"] = int(shape.shared_lights)
     if "bounce" in names:
         values["BOUNCE_STACK"] = bounce_stack(features, shape.depth)
+    if "object tree" in names:
+        values["TREE_STACK"] = shape.tree
     if "refraction" in names:
         values["MEDIA_DEPTH"] = MEDIA_DEPTH
     if counting:
@@ -159,10 +163,11 @@ def _insert(name: str, text: str, hooks: dict[str, list[tuple[str, str, int]]]) 
 
 def _files(features: Features, precision: Precision, entry: str) -> Iterator[str]:
     before, between, after = _ENTRIES[entry]
+    instead = {f.replaces: f.kernel for f in features.active if f.replaces}
     yield from (*_RAYS, *precision.kernels, *_TREES, *before)
     yield from precision.surface_kernels if "hit.cl" in before else ()
-    yield from (f.kernel for f in features.active if f.early)
-    yield from between
+    yield from (f.kernel for f in features.active if f.early and not f.replaces)
+    yield from (instead.get(name, name) for name in between)
     yield from (f.kernel for f in features.active if not f.early)
     yield from after
 

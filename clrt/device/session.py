@@ -56,7 +56,7 @@ class Buffers:
         self.eye_planes = self.empty(self.plane_bytes)
         with_shadows = any(name == "light_planes" for f in features.active for name, _ in f.parameters)
         if with_shadows:
-            self.effects["light_planes"] = self.empty(self.plane_bytes * (lights if self.shared_lights else 1))
+            self.effects["light_planes"] = self.empty(self.plane_bytes * (max(1, lights) if self.shared_lights else 1))
 
     @property
     def size(self) -> int:
@@ -90,9 +90,13 @@ class Buffers:
         if not packed.slots:
             return
         size = (-(-packed.slots // _PREPARE_LOCAL) * _PREPARE_LOCAL,)
-        origin = _double4(packed.origin)
         with kernel_cache.loading():
-            cl.Kernel(built, "prepare_triangles")(queue, size, (_PREPARE_LOCAL,), self.vertices, origin, self.triangles, count)
+            kernel = cl.Kernel(built, "prepare_triangles")
+            for origin, first, end in packed.runs:
+                part = (-(-(end - first) // _PREPARE_LOCAL) * _PREPARE_LOCAL,)
+                kernel(
+                    queue, part, (_PREPARE_LOCAL,), self.vertices, _double4(origin), self.triangles, np.int32(end), global_offset=(first,)
+                )
             if planes:
                 self._prepare_planes(cl.Kernel(built, "prepare_planes"), size, count)
             queue.finish()

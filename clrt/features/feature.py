@@ -31,6 +31,7 @@ class Feature:
     branches : packets of rays that it may send on from one hit
     sampled : it draws random numbers: what is seen is a mean of samples
     needs : what must be in the program for this one to be: without one of these there is nothing that it could change
+    replaces : the file that its own stands in for, at the same place in the program
     helper : a part that effects share; no effect of its own
     switch : it acts though no data ask for it, so its code asks HAVE_<NAME> in a program of all effects; 1 in any other
     """
@@ -47,6 +48,7 @@ class Feature:
     branches: int = 0
     sampled: bool = False
     needs: tuple[Feature, ...] = ()
+    replaces: str = ""
     helper: bool = False
     switch: bool = False
 

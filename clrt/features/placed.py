@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clrt.features.feature import Feature, Joint
+from clrt.features.motion import MOTION
 from clrt.features.shapes import SMOOTH
 from clrt.scene.model import Scene
 from clrt.scene.placed import placement_count, shown
@@ -24,7 +25,7 @@ INSTANCES = Feature("instances", _instance_caller, "instance.cl", early=True)
 #: effects by which objects are seen through a transform
 PLACED = Feature(
     "placed",
-    Joint((INSTANCES,)),
+    Joint((INSTANCES, MOTION)),
     "placed.cl",
     early=True,
     parameters=(("placements", "global const Placement *placements"), ("object_origins", "global const double *object_origins")),

@@ -14,7 +14,7 @@ def _smooth_caller(scene: Scene) -> int | None:
 
 def can_shadow(scene: Scene) -> bool:
     """Something can stand in a light's way: a lone flat triangle cannot shadow itself, a curved one and a sphere can."""
-    return scene.triangle_count > 1 or len(scene.spheres) > 0 or _smooth_caller(scene) is not None
+    return scene.triangle_count > 1 or len(scene.instances) > 0 or len(scene.spheres) > 0 or _smooth_caller(scene) is not None
 
 
 SPHERES = Feature(

@@ -16,6 +16,7 @@ IntArray = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]
 
 UNIT_ROUNDOFF = 2.0**-53
+_NUMBERS = 1 << 19  #: transformed at a time: few enough to stay in a cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,10 +95,13 @@ def placed_boxes(scene: Scene, placed: Placements, *, points: float = np.inf) ->
         which, item = np.flatnonzero(placed.object == number), scene.objects[number]
         spread = np.unique(item.vertices.reshape(-1, 3), axis=0) if len(which) * 3.0 * len(item) <= points else _corners(*box_of(item))
         slack = 16.0 * UNIT_ROUNDOFF * (np.abs(linear[which]) @ np.abs(spread).max(0, initial=0.0) + np.abs(shift[which]))
-        for i, grown in zip(which.tolist(), slack, strict=True):
-            # Axis by axis: the rows of a product are long, and its columns would be three.
-            ends = linear[i] @ spread.T
-            lo[i], hi[i] = ends.min(1) + shift[i] - grown, ends.max(1) + shift[i] + grown
+        at_once = max(1, _NUMBERS // len(spread))
+        for start in range(0, len(which), at_once):
+            part = which[start : start + at_once]
+            ends = linear[part] @ spread.T
+            lo[part], hi[part] = ends.min(2) + shift[part], ends.max(2) + shift[part]
+        lo[which] -= slack
+        hi[which] += slack
     return swept(scene, lo, hi, (linear @ placed.motion[:, :, None])[:, :, 0])
 
 
