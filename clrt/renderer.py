@@ -11,7 +11,7 @@ from pathlib import Path
 
 from clrt.device import program
 from clrt.device.context import Device, open_device
-from clrt.device.pack import local_origin, pack
+from clrt.device.pack import pack, tree_origins
 from clrt.device.session import Buffers, Tracer, check_picture
 from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
@@ -19,9 +19,11 @@ from clrt.features.choice import effect_names, not_called_for
 from clrt.files import atomic_write
 from clrt.image.image import Image
 from clrt.kdtree import build_tree
+from clrt.kdtree.boxtree import depth_limit
 from clrt.kdtree.tree import KdTree
 from clrt.precision import DEFAULT, Precision, rung
 from clrt.scene.model import Scene
+from clrt.scene.placed import placement_count
 from clrt.scene.scale import at_working_size
 from clrt.scene.words.frame import MOST_SAMPLES
 from clrt.stats import ObjectStats, RunStats
@@ -139,10 +141,10 @@ def _with_sampling(scene: Scene, samples: int | None, seed: int) -> Scene:
 
 
 def build_trees(scene: Scene, tree: str, tell: Progress) -> Prepared:
-    """A kd-tree an object, over coordinates relative to the scene's local origin."""
-    origin, trees, seconds = local_origin(scene), [], []
+    """A kd-tree an object, over coordinates relative to the object's origin."""
+    trees, seconds = [], []
     total, done = max(1, scene.triangle_count), 0
-    for item in scene.objects:
+    for item, origin in zip(scene.objects, tree_origins(scene), strict=True):
         tell("trees", done / total)
         share = len(item) / total
         start = time.perf_counter()
@@ -160,7 +162,9 @@ def program_shape(prepared: Prepared, features: Features, shared_lights: bool) -
     """The sizes that the program of these features is compiled for."""
     deepest = max((t.depth for t in prepared.trees), default=0)
     bounces = any(f.name == "bounce" for f in features.active)
-    return program.Shape(program.stack_size(deepest), prepared.scene.depth if bounces else 0, shared_lights)
+    scene = prepared.scene
+    boxes = depth_limit(len(scene.objects) + placement_count(scene) + len(scene.spheres))
+    return program.Shape(program.stack_size(deepest), scene.depth if bounces else 0, shared_lights, program.stack_size(boxes))
 
 
 def open_tracer(

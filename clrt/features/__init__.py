@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from clrt.features import camera, cutouts, helpers, lamps, placed, motion, rough, sampled, shapes, surfaces, surroundings
+from clrt.features import camera, cutouts, helpers, lamps, motion, placed, rough, sampled, shapes, surfaces, surroundings
 from clrt.features.feature import REAL, Calls, Feature
 from clrt.scene.model import Scene
 
@@ -29,6 +29,7 @@ FEATURES: tuple[Feature, ...] = (
     helpers.WIDE_EYE,
     helpers.PATH,
     placed.INSTANCES,
+    motion.MOTION,
     placed.PLACED,
     placed.OBJECT_TREE,
     shapes.SPHERES,

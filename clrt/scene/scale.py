@@ -6,12 +6,13 @@ kilometres is brought to a size near 1 first. The picture is the same, whatever 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from clrt.scene.model import FloatArray, Material, PointLight, Scene, SpotLight
+from clrt.scene.model import FloatArray, Lens, Material, PointLight, Scene, SpotLight
 
 _ORDINARY = 20  #: scenes between 2^-20 and 2^20 stay as they are: their products stay within 2^-60 and 2^60
 
@@ -49,11 +50,22 @@ def scaled(scene: Scene, exponent: int) -> Scene:
         red, green, blue = np.ldexp(material.absorb, -exponent).tolist()
         return replace(material, absorb=(red, green, blue))
 
+    def way(vector: tuple[float, float, float]) -> tuple[float, float, float]:
+        x, y, z = times(np.asarray(vector, np.float64)).tolist()
+        return x, y, z
+
+    def wider(lens: Lens | None) -> Lens | None:
+        return lens and replace(lens, radius=math.ldexp(lens.radius, exponent), focus=math.ldexp(lens.focus, exponent))
+
     return replace(
         scene,
+        lens=wider(scene.lens),
+        shutter=scene.shutter and replace(scene.shutter, eye_motion=way(scene.shutter.eye_motion)),
         materials=tuple(map(thinned, scene.materials)),
         camera=replace(scene.camera, eye=times(scene.camera.eye)),
-        objects=tuple(replace(o, vertices=times(o.vertices)) for o in scene.objects),
+        objects=tuple(replace(o, vertices=times(o.vertices), motion=way(o.motion)) for o in scene.objects),
+        instances=tuple(replace(i, world_from_object=np.column_stack([i.world_from_object[:, :3], times(i.world_from_object[:, 3])]))
+                        for i in scene.instances),
         spheres=replace(scene.spheres, centers=times(scene.spheres.centers), radii=times(scene.spheres.radii)),
         lights=tuple(light for light in map(moved, scene.lights) if isinstance(light, PointLight)),
         spots=tuple(light for light in map(moved, scene.spots) if isinstance(light, SpotLight)),
