@@ -19,7 +19,7 @@ def _eye_caller(scene: Scene) -> int | None:
     return scene.shutter.line if scene.shutter is not None and any(scene.shutter.eye_motion) else None
 
 
-MOTION = Feature("motion", _object_caller, "motion.cl", sampled=True)
+MOTION = Feature("motion", _object_caller, "motion.cl", early=True, sampled=True)
 EYE_MOTION = Feature(
     "moving eye",
     _eye_caller,
