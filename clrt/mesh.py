@@ -33,17 +33,22 @@ def load_mesh(path: str | os.PathLike[str]) -> tuple[NDArray[np.float64], NDArra
     Geometry is as in the file: nothing is merged, moved or thrown away but vertices that no face uses.
     Raises MeshError, naming the file, the cause and the remedy.
     """
-    file = Path(path)
+    data, extension = read_checked(Path(path))
+    loaded = parsed(data, extension, str(path)).to_mesh()
+    vertices, faces = check_mesh(loaded.vertices, loaded.faces, str(path))
+    check_count(data, extension, len(faces), str(path))
+    return vertices, faces
+
+
+def read_checked(file: Path) -> tuple[bytes, str]:
+    """A mesh file and its extension, once nothing is left in it that the loader would guess at. Raises MeshError."""
     extension = file.suffix.lower()
     data = _read(file, extension)
     if extension == ".obj":
-        data = _check_obj(data, str(path))
+        data = _check_obj(data, str(file))
     elif extension == ".stl":
-        _check_ascii_stl(data, str(path))
-    loaded = _load(data, extension, str(path))
-    vertices, faces = check_mesh(loaded.vertices, loaded.faces, str(path))
-    _check_count(data, extension, len(faces), str(path))
-    return vertices, faces
+        _check_ascii_stl(data, str(file))
+    return data, extension
 
 
 def check_mesh(
@@ -131,14 +136,15 @@ def _read(file: Path, extension: str) -> bytes:
     return data
 
 
-def _load(data: bytes, extension: str, name: str) -> Any:
+def parsed(data: bytes, extension: str, name: str, **options: Any) -> Any:
+    """The trimesh scene of a file's bytes; `options` are those of the loader of its kind. Raises MeshError."""
     try:
         import trimesh
     except ImportError as error:
         raise MeshError(f"{name}: reading mesh files needs trimesh; install it: pip install 'clrt[mesh]'") from error
     kind = extension[1:]
     try:
-        return trimesh.load_mesh(io.BytesIO(data), file_type=kind, process=False)
+        return trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False, **options)
     # The loader's parsers raise whatever their parts raise, from IndexError to ModuleNotFoundError
     except Exception as error:
         cause = "it is cut off or not of this kind" if isinstance(error, ImportError) else str(error) or type(error).__name__
@@ -183,7 +189,7 @@ def _check_ascii_stl(data: bytes, name: str) -> None:
         raise MeshError(f"{name}: has no `endsolid` at its end: the file is cut off; export the mesh again")
 
 
-def _check_count(data: bytes, extension: str, faces: int, name: str) -> None:
+def check_count(data: bytes, extension: str, faces: int, name: str) -> None:
     """The header of OFF and PLY says how many faces follow; the loader takes fewer in silence."""
     told = _told_faces(data, extension)
     if told > faces:

@@ -17,6 +17,7 @@ from clrt.scene.environment import read_environment
 from clrt.scene.faults import Faults
 from clrt.scene.grammar import LETTERS
 from clrt.scene.instances import build_instances, splits
+from clrt.scene.mesh_lines import place_mesh_lines, read_mesh_lines
 from clrt.scene.model import Instance, Material, MeshObject, PointLight, Scene, Spheres
 from clrt.scene.models.direct import is_model, load_model_scene
 from clrt.scene.motion import with_motion
@@ -71,16 +72,22 @@ def parse_scene(
     _check_words(found, faults)
     textured = read_textures(found, folders or Folders(Path()), faults)
     environment = read_environment(found, folders or Folders(Path()), faults)
+    mesh_lines = read_mesh_lines(found, folders or Folders(Path()), faults)
     camera = build_camera(found, right_handed, faults)
     faults.raise_if_any()
     assert camera is not None  # a camera that cannot be built is a fault
 
     warnings: list[str] = []
     objects = build_objects(found, splits(found, split_objects, warnings), warnings, textured.uvs)
-    objects, instances = build_instances(objects, found, faults)
     draft = Draft(textured.materials(_materials(found)), _lights(found))
     for call in found.words:
         WORDS[call.name].apply(draft, call)
+    triangles, own = sum(map(len, objects)), len(textured.textures)
+    meshes = place_mesh_lines(mesh_lines, triangles, len(objects), draft.materials, own, found, right_handed, faults)
+    draft.materials += meshes.materials
+    warnings += meshes.warnings
+    objects, instances = build_instances((*objects, *meshes.objects), found, faults, meshes.named)
+    instances = (*meshes.instances, *instances)
     _check_absorption(objects, draft.materials, found, faults)
     faults.raise_if_any()
     if not (draft.lights or draft.spots or draft.suns or environment or any(max(m.emission) > 0.0 for m in draft.materials)):
@@ -88,7 +95,7 @@ def parse_scene(
     warnings += untilted(objects, draft.materials)
     scene = Scene(
         camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,
-        source, tuple(warnings), textures=textured.textures, spots=tuple(draft.spots), suns=tuple(draft.suns),
+        source, tuple(warnings), textures=(*textured.textures, *meshes.textures), spots=tuple(draft.spots), suns=tuple(draft.suns),
     )  # fmt: skip
     scene = replace(scene, samples=draft.samples, samples_line=draft.samples_line, environment=environment, **draft.fields)
     scene = replace(scene, instances=instances)
@@ -101,6 +108,8 @@ def _check_primitives(found: Declarations, faults: Faults) -> None:
     """There is something to render, and a material above the first of it."""
     first = {letter: int(lines[0]) for letter in "TSM" if len(lines := found.lines_of(letter))}
     if "T" not in first and "S" not in first:
+        if any(line.lstrip().startswith("mesh ") for line in found.text_lines):
+            return
         faults.add(1, 1, 'there is nothing to render; add a triangle, such as "T 0 0 1 1 0 1 0 1 1", or a sphere, such as "S 0 0 2 1"')
         return
     line, letter = min((first[letter], letter) for letter in "TS" if letter in first)

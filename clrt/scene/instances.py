@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,34 +62,37 @@ class _Places:
 
 
 def build_instances(
-    objects: Sequence[MeshObject], found: Declarations, faults: Faults
+    objects: Sequence[MeshObject], found: Declarations, faults: Faults, meshes: Mapping[int, int] | None = None
 ) -> tuple[tuple[MeshObject, ...], tuple[Instance, ...]]:
     """Named objects and the instances of the text's `instance` lines; instances of instances have their transforms put together.
+
+    meshes : number of a line with the word `mesh` -> index of the object that it names
 
     Faults: names that are unknown or stand for two things, instances of themselves, scales that are too great or do not
     fit smooth triangles, nothing to be seen.
     """
     named = name_objects(tuple(objects), found, faults)
     calls = [c for c in found.words if c.name == "instance"]
-    places = _places(named, found, calls, faults)
+    places = _places(meshes or {}, found, calls, faults)
     made = [instance for call in calls if (instance := _instance(call, named, places, faults)) is not None]
     shown_ones = tuple(i for i, call in made if call.text("hidden") == "no")
-    hidden = [c for c in found.words if c.name in ("object", "instance") and c.text("hidden") == "yes"]
+    hidden = [c for c in found.words if c.name in ("object", "instance", "mesh") and c.text("hidden") == "yes"]
     if hidden and not shown_ones and all(o.hidden for o in named) and not len(found.lines_of("S")) and not any(map(faults.on_line, [c.line for c in calls])):
         faults.add(hidden[0].line, hidden[0].column, "everything is hidden; place an instance of it, or leave out hidden=yes")
     return named, shown_ones
 
 
-def _places(named: Sequence[MeshObject], found: Declarations, calls: list[WordCall], faults: Faults) -> _Places:
+def _places(meshes: Mapping[int, int], found: Declarations, calls: list[WordCall], faults: Faults) -> _Places:
     lines: dict[str, int] = {}
     objects: dict[str, int] = {}
-    for call in (c for c in found.words if c.name == "object" or (c.name == "instance" and c.text("name"))):
+    for call in (c for c in found.words if c.name == "object" or (c.name in ("instance", "mesh") and c.text("name"))):
         name = call.text("name")
         if name in lines:
             faults.add(call.line, call.columns.get("name", call.column), f"a second {shown(name)}; the first is line {lines[name]}, give one another name")
             continue
         lines[name] = call.line
-        if call.name == "object" and (at := object_at(found, call.line)) is not None:
+        at = object_at(found, call.line) if call.name == "object" else meshes.get(call.line)
+        if at is not None:
             objects[name] = at
     return _Places(objects, {c.text("name"): c for c in calls if c.text("name") and lines[c.text("name")] == c.line})
 

@@ -49,6 +49,10 @@ class Declarations:
         read = [self.get(letter, fields).lines for fields in forms or LETTERS[letter]]
         return np.sort(np.concatenate([*read, np.array(self.broken.get(letter, []), np.int64)]))
 
+    def place(self, line: int) -> str:
+        """A line in words, for warnings."""
+        return f"line {line}"
+
     def token(self, line: int, index: int) -> Token:
         """Token `index` of a line, 0 being its letter or word."""
         return tokenise(self.text_lines[line - 1])[index]

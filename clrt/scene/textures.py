@@ -22,7 +22,7 @@ from clrt.scene.words.word import WordCall
 
 LEAST_TURN = 2.0**-40  #: sine of the angle between two sides on the picture up to which they lie on a line
 #: axis that is looked along -> the axes that u and v follow
-_PLANES = {"x": (2, 1), "y": (0, 2), "z": (0, 1)}
+PLANES = {"x": (2, 1), "y": (0, 2), "z": (0, 1)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +147,7 @@ def _coordinates(
     uvs = np.zeros((len(soup), 3, 2))
     for number, call in projections.items():
         rows = np.flatnonzero(material == number)
-        uvs[rows] = soup.vertices[rows][:, :, _PLANES[call.text("axis")]] / call.number("scale")
+        uvs[rows] = soup.vertices[rows][:, :, PLANES[call.text("axis")]] / call.number("scale")
     given = _by_triangle(found, soup.lines, faults)
     for triangle, call in given.items():
         uvs[triangle] = np.array(list(call.values.values()), np.float64).reshape(3, 2)

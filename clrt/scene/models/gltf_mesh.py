@@ -12,7 +12,7 @@ from clrt.scene.model import FloatArray
 from clrt.scene.models.gltf_accessors import read_floats, read_indices
 from clrt.scene.models.gltf_file import Document
 from clrt.scene.models.gltf_json import Item
-from clrt.scene.models.model_file import Part
+from clrt.scene.models.model_file import Part, joined
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
@@ -37,7 +37,7 @@ def read_mesh(document: Document, mesh: Item, placing: Sequence[UvMap | None], a
     name = mesh.text("name", mesh.path)
     split = any(apart[i] for piece in pieces for i in np.unique(piece.material_ids).tolist() if i >= 0)
     groups = [[piece] for piece in pieces] if split else [pieces] if pieces else []
-    return tuple(_joined(group, name) for group in groups)
+    return tuple(joined(group, name) for group in groups)
 
 
 def _read_primitive(document: Document, item: Item, placing: Sequence[UvMap | None]) -> Part | None:
@@ -104,16 +104,3 @@ def _coordinates(document: Document, attributes: Item, at: UvMap | None, item: I
     given = _attribute(document, attributes, key, 2, count) if attributes.has(key) else np.zeros((count, 2))
     down = given @ at.matrix[:, :2].T + at.matrix[:, 2]
     return np.stack([down[:, 0], 1.0 - down[:, 1]], axis=1)
-
-
-def _joined(pieces: list[Part], name: str) -> Part:
-    def merged(arrays: list[FloatArray | None], width: int) -> FloatArray | None:
-        if all(array is None for array in arrays):
-            return None
-        counts = [len(piece.vertices) for piece in pieces]
-        return np.concatenate([np.zeros((n, 3, width)) if a is None else a for a, n in zip(arrays, counts, strict=True)])
-
-    return Part(
-        np.concatenate([piece.vertices for piece in pieces]), np.concatenate([piece.material_ids for piece in pieces]),
-        merged([piece.normals for piece in pieces], 3), merged([piece.uvs for piece in pieces], 2), name,
-    )  # fmt: skip

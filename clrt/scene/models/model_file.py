@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
 
 from clrt.scene.model import FloatArray, IntArray, Material, PointLight, SpotLight, SunLight, Texture
 
@@ -36,6 +40,21 @@ class Part:
     uvs: FloatArray | None = None
     name: str = "mesh"
     copies: tuple[FloatArray, ...] = ()
+
+
+def joined(parts: Sequence[Part], name: str) -> Part:
+    """Parts without copies as one."""
+
+    def merged(arrays: list[FloatArray | None], width: int) -> FloatArray | None:
+        if all(array is None for array in arrays):
+            return None
+        counts = [len(part.vertices) for part in parts]
+        return np.concatenate([np.zeros((n, 3, width)) if a is None else a for a, n in zip(arrays, counts, strict=True)])
+
+    return Part(
+        np.concatenate([part.vertices for part in parts]), np.concatenate([part.material_ids for part in parts]),
+        merged([part.normals for part in parts], 3), merged([part.uvs for part in parts], 2), name,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,7 +100,8 @@ class Notes:
             self.told.append(warning)
 
 
-def shifted(material: Material, textures: int) -> Material:
-    """The material with its pictures' places among the textures moved by `textures`."""
+def shifted(material: Material, textures: int, line: int) -> Material:
+    """The material with its pictures' places among the textures moved by `textures`, and `line` for the line of all that it asks for."""
     maps = {name: getattr(material, name) for name in ("texture", "normal_map", "metal_rough_map", "emission_map")}
-    return replace(material, **{name: at + textures for name, at in maps.items() if at >= 0})
+    changes: dict[str, Any] = {f.name: line for f in fields(material) if f.name == "line" or f.name.endswith("_line")}
+    return replace(material, **changes | {name: at + textures for name, at in maps.items() if at >= 0})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -87,7 +88,7 @@ def _checked(given: FloatArray, faces: FloatArray) -> FloatArray | None:
     return None if flat.all() else corners
 
 
-def flat_warnings(objects: tuple[MeshObject, ...]) -> list[str]:
+def flat_warnings(objects: Sequence[MeshObject]) -> list[str]:
     """Counts triangles without an area, which are never hit."""
     told = []
     for item in objects:

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 
 from clrt.scene.faults import Faults
 from clrt.scene.tokens import Token
-from clrt.scene.words import eye, frame, glass, instances, lamps, pictures, reader, rough, shining, surface, surroundings
+from clrt.scene.words import eye, frame, glass, instances, lamps, meshes, pictures, reader, rough, shining, surface, surroundings
 from clrt.scene.words.word import Choice, Draft, Text, Word, WordCall
 
 __all__ = ["WORDS", "Choice", "Draft", "Text", "Word", "WordCall", "read_word"]
 
-WORDS: dict[str, Word] = {**frame.WORDS, **eye.WORDS, **lamps.WORDS, **pictures.WORDS, **glass.WORDS, **instances.WORDS, **rough.WORDS, **shining.WORDS, **surface.WORDS, **surroundings.WORDS}
+WORDS: dict[str, Word] = {**frame.WORDS, **eye.WORDS, **lamps.WORDS, **pictures.WORDS, **glass.WORDS, **instances.WORDS, **meshes.WORDS, **rough.WORDS, **shining.WORDS, **surface.WORDS, **surroundings.WORDS}
 
 
 def read_word(tokens: Sequence[Token], line: int, faults: Faults) -> WordCall | None:
