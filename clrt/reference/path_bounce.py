@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,6 +35,11 @@ def next_rays(world: PathWorld, wave: Wave, surface: Surface, color: FloatArray,
     if world.scene.indirect is not None:
         waves.append(_scattered(world, wave, surface, color, rng))
     return Wave.join(waves)
+
+
+def straight_on(wave: Wave, surface: Surface, part: FloatArray) -> Wave:
+    """The rays that see what lies behind surfaces of which they pass the `part` (m,): as if nothing had been there."""
+    return replace(wave, origin=surface.point, own=surface.prim, tint=wave.tint * part[:, None])
 
 
 def _bounces(world: PathWorld, wave: Wave, surface: Surface, t: FloatArray) -> Bounces:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.reference.crossings import NOISE, Rays
+from clrt.reference.normalmap import tilted
 from clrt.reference.path_world import PathWorld, Wave
 from clrt.reference.shade import Surface, dot, surfaces
 from clrt.reference.texture import tints
@@ -79,15 +80,36 @@ def closest(world: PathWorld, wave: Wave) -> tuple[IndexArray, FloatArray]:
 def seen(
     world: PathWorld, origin: FloatArray, direction: FloatArray, distance: FloatArray, own: IndexArray, target: IndexArray, time: FloatArray
 ) -> FloatArray:
-    """(m,) the part of light that comes through to `origin` along the open segment of length `distance` (inf: half-line), 0 or 1.
+    """(m,) the part of light that comes through to `origin` along the open segment of length `distance` (inf: half-line).
 
     own, target : primitives that the segment starts and ends on, -1 for none. The target's own far side is asked of the caller.
     """
     t = distances(world, origin, direction, own, time)
-    noise = NOISE * (world.prims.largest + np.where(np.isfinite(distance), distance, 0.0))
-    blocks = t < (distance - noise)[:, None]
+    end = distance - NOISE * (world.prims.largest + np.where(np.isfinite(distance), distance, 0.0))
+    blocks = t < end[:, None]
     blocks &= target[:, None] != np.arange(t.shape[1])
-    return np.where(blocks.any(axis=1), 0.0, 1.0)
+    if world.cover.whole:
+        return np.where(blocks.any(axis=1), 0.0, 1.0)
+    ray, prim = np.nonzero(blocks)
+    far, again = _far_sides(world, origin, direction, own, ray, prim, t[ray, prim], end)
+    ray, prim, t = np.r_[ray, ray[again]], np.r_[prim, prim[again]], np.r_[t[ray, prim], far[again]]
+    point = origin[ray] + t[:, None] * direction[ray] - world.motion[prim] * time[ray, None]
+    left = np.ones(len(own))
+    np.multiply.at(left, ray, 1.0 - world.cover.kept(world.prims, prim, point, np.zeros(len(ray)))[0])
+    return left
+
+
+def _far_sides(
+    world: PathWorld, origin: FloatArray, direction: FloatArray, own: IndexArray,
+    ray: IndexArray, prim: IndexArray, t: FloatArray, end: FloatArray,
+) -> tuple[FloatArray, BoolArray]:  # fmt: skip
+    """Of met primitives (k,): where the ray leaves the spheres again that it has entered at t, (k,), and whether there is such a place."""
+    count = world.prims.triangle_count
+    if not len(world.prims.radii):
+        return t, np.zeros(len(t), np.bool_)
+    to_center = world.prims.centers[np.maximum(prim - count, 0)] - origin[ray]
+    far = 2.0 * dot(to_center, direction[ray]) - t
+    return far, (prim >= count) & (own[ray] != prim) & (far > t) & (far < end[ray])
 
 
 def surfaces_met(world: PathWorld, wave: Wave, prim: IndexArray, t: FloatArray) -> tuple[Surface, FloatArray]:
@@ -96,7 +118,16 @@ def surfaces_met(world: PathWorld, wave: Wave, prim: IndexArray, t: FloatArray) 
     m = len(prim)
     at_rest = surfaces(world.prims, Rays(wave.origin - shift, wave.direction, wave.own, np.zeros(m), np.ones(m)), prim, t)
     tint, _ = tints(world.scene, world.prims, at_rest)
+    at_rest = tilted(world.scene, world.prims, at_rest)
     return replace(at_rest, point=at_rest.point + shift), world.materials.color[at_rest.material] * tint
+
+
+def solid(world: PathWorld, wave: Wave, surface: Surface) -> FloatArray:
+    """(m,) the part of each hit that is seen; the rest is what lies straight behind."""
+    if world.cover.whole:
+        return np.ones(len(wave))
+    shift = world.motion[surface.prim] * wave.time[:, None]
+    return world.cover.solid(world.prims, replace(surface, point=surface.point - shift))[0]
 
 
 def beyond_face(surface: Surface, direction: FloatArray) -> BoolArray:

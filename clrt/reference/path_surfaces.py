@@ -10,10 +10,12 @@ from clrt.reference.path_lights import Incoming, arriving, from_areas, from_envi
 from clrt.reference.path_microfacet import albedo, diffuse_grazing, grazing, lobe
 from clrt.reference.path_world import Generator, PathWorld, Wave
 from clrt.reference.shade import Surface, dot
+from clrt.reference.terminator import face_between
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
+FAR = 1e6  #: lengths away where a light without an end stands
 DIELECTRIC = 0.04  #: what a metal-rough surface that is no metal reflects straight on (glTF 2.0, appendix B)
 
 
@@ -84,8 +86,11 @@ def phong(world: PathWorld, surface: Surface, color: FloatArray, direction: Floa
     return np.asarray(color * (strength / np.pi)[:, None])
 
 
-def direct(world: PathWorld, wave: Wave, surface: Surface, color: FloatArray, rng: Generator) -> FloatArray:
-    """(m, 3) what the surface shows of the light that comes straight from lights of all kinds; one sample of those with a size."""
+def direct(world: PathWorld, wave: Wave, surface: Surface, color: FloatArray, goes_on: bool, rng: Generator) -> FloatArray:
+    """(m, 3) what the surface shows of the light that comes straight from lights of all kinds; one sample of those with a size.
+
+    goes_on : whether mirrored rays are followed from here; where they are not, gloss shows no lights, either
+    """
     m = len(wave)
     total = np.zeros((m, 3))
     for light in (*from_points(world, surface.point), *from_suns(world, m)):
@@ -98,7 +103,9 @@ def direct(world: PathWorld, wave: Wave, surface: Surface, color: FloatArray, rn
         wide.append(from_environment(world.scene.environment, m, rng))
     for light in wide:
         by_all = matte(world, surface, color, light.direction) + shiny(world, surface, color, light.direction)
-        total += _lit(world, wave, surface, by_all + polished(world, surface, light.direction), light)
+        if goes_on:
+            by_all += polished(world, surface, light.direction)
+        total += _lit(world, wave, surface, by_all, light)
     return total
 
 
@@ -114,6 +121,17 @@ def _lit(world: PathWorld, wave: Wave, surface: Surface, f_cos: FloatArray, ligh
     way = np.where(near[:, None], end - origin, part.direction)
     length = np.linalg.norm(way, axis=1)
     towards = Incoming(way / length[:, None], np.where(near, length, np.inf), np.ones((len(rows), 3)), part.target)
+    arrived = arriving(world, towards, origin, surface.prim[rows], wave.time[rows])
+    arrived[_behind_own_face(world, surface, rows, wave.time[rows], np.where(near[:, None], end, origin + FAR * way))] = 0.0
     result = np.zeros_like(reflected)
-    result[rows] = reflected[rows] * arriving(world, towards, origin, surface.prim[rows], wave.time[rows])
+    result[rows] = reflected[rows] * arrived
     return result
+
+
+def _behind_own_face(world: PathWorld, surface: Surface, rows: IndexArray, time: FloatArray, light: FloatArray) -> IndexArray:
+    """Places in `rows` whose curved triangle stands between the lifted point and the light at (k, 3) behind its plane."""
+    at = np.flatnonzero(surface.curved[rows])
+    hits = rows[at]
+    corners = world.prims.vertices[surface.prim[hits]] + (world.motion[surface.prim[hits]] * time[at, None])[:, None]
+    hidden, _ = face_between(corners, surface.n_geo[hits], surface.point[hits], surface.lift[hits], light[at], np.ones(len(at)))
+    return at[hidden]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from clrt.reference import media
 from clrt.reference.bounce import STACK_SIZE, MediumStack
 from clrt.reference.geometry import MaterialTable, Primitives
 from clrt.reference.lines import TILE_BYTES
+from clrt.reference.opacity import SceneCover
 from clrt.reference.shade import Surface
 from clrt.scene.model import Scene
 
@@ -33,7 +34,7 @@ class PathWorld:
     emission : (n + k, 3) radiance of each primitive; area : (n + k,) its area
     metal_rough, metallic, gloss, alpha : (materials,) alpha is that of the facets of metal-rough materials and of those with gloss
     rank, absorption : of objects, see media.ranks and media.absorption
-    first : the media around the eye, as of one ray
+    first : the media around the eye, as of one ray; cover : what primitives in the way of light keep of it
     """
 
     scene: Scene
@@ -50,6 +51,7 @@ class PathWorld:
     rank: IndexArray
     absorption: FloatArray
     first: MediumStack
+    cover: SceneCover
 
     @classmethod
     def of(cls, scene: Scene) -> PathWorld:
@@ -71,7 +73,8 @@ class PathWorld:
                                       for name in ("metallic", "gloss", "roughness"))  # fmt: skip
         alpha = np.maximum(np.where(metal_rough, roughness, gloss) ** 2, LEAST_ALPHA)
         return cls(scene, prims, materials, motion, duals, emission, np.concatenate([area, 4.0 * np.pi * prims.radii**2]),
-                   metal_rough, metallic, gloss, alpha, rank, absorption, _around_eye(scene, prims, materials, rank))  # fmt: skip
+                   metal_rough, metallic, gloss, alpha, rank, absorption, _around_eye(scene, prims, materials, rank),
+                   SceneCover.of(scene))  # fmt: skip
 
     @property
     def emitters(self) -> IndexArray:
@@ -95,7 +98,7 @@ def _check(scene: Scene) -> None:
     if scene.indirect is not None and np.isfinite(scene.indirect.clamp):
         raise SceneError("a clamp makes pictures that depend on how they are sampled; the reference takes scenes without one")
     for k, material in enumerate(scene.materials):
-        if material.emission_map >= 0 or material.metal_rough_map >= 0 or material.normal_map >= 0:
+        if material.emission_map >= 0 or material.metal_rough_map >= 0:
             raise SceneError(f"material {k} has a map that the reference of sampled light does not read; leave it out")
 
 
@@ -133,6 +136,10 @@ class Wave:
 
     def take(self, rows: IndexArray) -> Wave:
         return Wave(*(getattr(self, f.name)[rows] for f in fields(Wave)))
+
+    def tinted(self, tint: FloatArray) -> Wave:
+        """The same rays with another tint."""
+        return replace(self, tint=tint)
 
     @classmethod
     def join(cls, waves: list[Wave]) -> Wave:

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from clrt.errors import LimitError
 from clrt.reference import media
 from clrt.reference.environment import radiance
-from clrt.reference.path_bounce import next_rays
+from clrt.reference.path_bounce import next_rays, straight_on
 from clrt.reference.path_eye import eye_rays
 from clrt.reference.path_fog import fogged
-from clrt.reference.path_hits import closest, surfaces_met
+from clrt.reference.path_hits import closest, solid, surfaces_met
 from clrt.reference.path_surfaces import direct
 from clrt.reference.path_world import Generator, PathWorld, Wave
 from clrt.scene.model import Scene
@@ -88,17 +88,23 @@ def _step(world: PathWorld, wave: Wave, total: FloatArray, goes_on: bool, rng: G
         airlight, left = fogged(world, wave, t, rng)
         _add(total, wave, tint * airlight)
         tint = tint * left[:, None]
-    wave = Wave(wave.origin, wave.direction, wave.own, tint, wave.path, wave.time, wave.stack, wave.drawn)
+    wave = wave.tinted(tint)
     missed, hit = np.flatnonzero(prim < 0), np.flatnonzero(prim >= 0)
     beyond = wave.take(missed)
     _add(total, beyond, beyond.tint * _sky(world, beyond))
     wave, prim, t = wave.take(hit), prim[hit], t[hit]
     surface, color = surfaces_met(world, wave, prim, t)
-    shown = np.where(wave.drawn[:, None], 0.0, world.emission[prim]) + direct(world, wave, surface, color, rng)
+    whole = wave
+    part = solid(world, wave, surface)
+    wave = wave.tinted(wave.tint * part[:, None])
+    shown = np.where(wave.drawn[:, None], 0.0, world.emission[prim]) + direct(world, wave, surface, color, goes_on, rng)
     if world.scene.indirect is None:
         shown += color * world.materials.ambient[surface.material][:, None]
     _add(total, wave, wave.tint * shown)
-    return next_rays(world, wave, surface, color, t, rng) if goes_on else wave.take(np.zeros(0, np.int64))
+    if not goes_on:
+        return wave.take(np.zeros(0, np.int64))
+    passed = straight_on(whole, surface, 1.0 - part)
+    return Wave.join([passed, next_rays(world, wave, surface, color, t, rng)])
 
 
 def _add(total: FloatArray, wave: Wave, value: FloatArray) -> None:
