@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from clrt.errors import SceneError
 from clrt.reference import media
 from clrt.reference.bounce import STACK_SIZE, MediumStack
+from clrt.reference.expand import expanded
 from clrt.reference.geometry import MaterialTable, Primitives
 from clrt.reference.lines import TILE_BYTES
 from clrt.reference.opacity import SceneCover
@@ -57,6 +58,7 @@ class PathWorld:
     def of(cls, scene: Scene) -> PathWorld:
         """Raises SceneError for what has no one expectation (a clamp) or is not known here."""
         _check(scene)
+        scene = expanded(scene)
         prims, materials = Primitives.build(scene), MaterialTable.build(scene)
         objects = sorted(scene.objects, key=lambda o: (o.first_prim, len(o)))
         still = np.zeros((len(scene.spheres), 3))

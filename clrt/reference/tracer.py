@@ -16,6 +16,7 @@ from clrt.reference import media
 from clrt.reference.bounce import STACK_SIZE, MediumStack, Walls, bounces
 from clrt.reference.crossings import BAND, Rays
 from clrt.reference.environment import behind
+from clrt.reference.expand import expanded
 from clrt.reference.geometry import MaterialTable, Primitives
 from clrt.reference.lights import lights_of
 from clrt.reference.lines import TILE_BYTES
@@ -74,6 +75,7 @@ class _World:
 
     @classmethod
     def of(cls, scene: Scene, tile_bytes: int) -> _World:
+        scene = expanded(scene)
         prims, materials = Primitives.build(scene), MaterialTable.build(scene)
         # Without depth no light goes through glass, and media are not followed.
         absorption = media.absorption(prims, materials) * (scene.depth > 0)

@@ -1,6 +1,6 @@
 """What stands where: objects at their own place, and placements, seen through a transform: instances, and objects that move.
 
-Numbers of placements: instances in their order, then the objects that move and are shown themselves.
+Numbers of placements: instances in their order, then the objects that are shown themselves and move or have instances.
 """
 
 from __future__ import annotations
@@ -41,30 +41,46 @@ def moves(item: MeshObject) -> bool:
     return any(item.motion)
 
 
+def _instanced(scene: Scene) -> BoolArray:
+    """(objects,) whether each has instances."""
+    found = np.zeros(len(scene.objects), np.bool_)
+    found[[instance.object for instance in scene.instances]] = True
+    return found
+
+
+def _itself(scene: Scene) -> list[int]:
+    """Objects at their own place that are placements there, too: those that move, and those with instances, whose coordinates may be far from all else."""
+    instanced = _instanced(scene).tolist()
+    return [i for i, item in enumerate(scene.objects) if not item.hidden and (instanced[i] or moves(item))]
+
+
 def shown(scene: Scene) -> BoolArray:
-    """(objects,) whether each is there at its own place, at rest."""
-    return np.array([not item.hidden and not moves(item) for item in scene.objects], np.bool_)
+    """(objects,) whether each is there at its own place, and no placement."""
+    there = np.array([not item.hidden for item in scene.objects], np.bool_)
+    there[_itself(scene)] = False
+    return there
 
 
 def placement_count(scene: Scene) -> int:
     """How many placements a scene has."""
-    return len(scene.instances) + sum(moves(item) and not item.hidden for item in scene.objects)
+    return len(scene.instances) + len(_itself(scene))
 
 
 def placements(scene: Scene) -> Placements:
     """The placements of a scene."""
-    moving = [i for i, item in enumerate(scene.objects) if moves(item) and not item.hidden]
+    itself = _itself(scene)
     first = len(scene.objects) + len(scene.spheres)
-    objects = np.array([i.object for i in scene.instances] + moving, np.int32)
-    medium = np.array([*range(first, first + len(scene.instances)), *moving], np.int32)
-    matrices = np.array([i.world_from_object for i in scene.instances] + [np.eye(3, 4)] * len(moving)).reshape(-1, 3, 4)
+    objects = np.array([i.object for i in scene.instances] + itself, np.int32)
+    medium = np.array([*range(first, first + len(scene.instances)), *itself], np.int32)
+    matrices = np.array([i.world_from_object for i in scene.instances] + [np.eye(3, 4)] * len(itself)).reshape(-1, 3, 4)
     motion = np.array([scene.objects[i].motion for i in objects.tolist()], np.float64).reshape(-1, 3)
     return Placements(objects, medium, matrices, motion)
 
 
 def object_origins(scene: Scene, origin: FloatArray) -> FloatArray:
-    """(objects, 3): what each object's coordinates are rounded relative to: `origin`, or the middle of an object that is hidden."""
-    return np.array([origin if not item.hidden else np.mean(box_of(item), axis=0) for item in scene.objects]).reshape(-1, 3)
+    """(objects, 3): what each object's coordinates are rounded relative to: `origin`, or the middle of an object that is hidden or has instances."""
+    apart = _instanced(scene) | np.array([item.hidden for item in scene.objects], np.bool_)
+    return np.array([np.mean(box_of(item), axis=0) if own else origin for item, own in zip(scene.objects, apart, strict=True)]).reshape(-1, 3)
 
 
 def box_of(item: MeshObject) -> tuple[FloatArray, FloatArray]:
