@@ -22,7 +22,9 @@ static __attribute__((noinline)) void opacity_through(const Geometry *geometry, 
         lane_int slot[LANES];
         real where[3 * LANES], kept[LANES];
         store_lanes(choose(blocked, hits.slot, (mask_n)-1), slot);
-        for (int a = 0; a < 3; a++) store_lanes(choose(blocked, ray_point(&rays, hits.t, a), (real_n)0), where + a * LANES);
+        real_n t = hits.t;
+        //@ opacity_distance
+        for (int a = 0; a < 3; a++) store_lanes(choose(blocked, ray_point(&rays, t, a), (real_n)0), where + a * LANES);
         opaque_at(geometry, slot, where, kept);
         left *= pass < OPACITY_MOST ? R(1.0) - load_lanes(kept) : choose(blocked, (real_n)0, (real_n)1);
         blocked &= is_greater(left, (real_n)0);

@@ -58,6 +58,9 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
 //@hook hit_distance
     t = choose(hit->found & is_less(hits->slot, (mask_n)geometry->slot_count), R(0.5) * (hits->t + hits->low), t);
 //@end
+//@hook opacity_distance
+        t = R(0.5) * (hits.t + hits.low);
+//@end
 //@hook bounce_start
     const Geometry seen = *geometry;
     const Rays copy = *rays;

@@ -17,7 +17,10 @@ from clrt.scene.model import Scene
 SCENES = Path(__file__).parents[1] / "scenes"
 ALL = sorted(SCENES.rglob("*.txt"))
 EXPECTED = re.compile(r"^# pixel \((\d+),(\d+)\) is (\S+) (\S+) (\S+)$", re.MULTILINE)
-EFFECTS = ("absorb", "corners", "falloff", "fresnel", "glass", "mirror", "phong", "shadow", "smooth", "sphere", "spot", "sun", "texture")
+EFFECTS = (
+    "absorb", "corners", "falloff", "fresnel", "glass", "mirror", "normalmap", "opacity", "phong", "shadow", "smooth", "sphere", "spot", "sun",
+    "texture",
+)  # fmt: skip
 
 #: the comments have six decimals
 ROUNDING = 0.5e-6
