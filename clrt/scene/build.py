@@ -16,6 +16,7 @@ from clrt.scene.camera import build_camera
 from clrt.scene.environment import read_environment
 from clrt.scene.faults import Faults
 from clrt.scene.grammar import LETTERS
+from clrt.scene.include import expand
 from clrt.scene.instances import build_instances, splits
 from clrt.scene.mesh_lines import place_mesh_lines, read_mesh_lines
 from clrt.scene.model import Instance, Material, MeshObject, PointLight, Scene, Spheres
@@ -26,7 +27,7 @@ from clrt.scene.picture import Folders
 from clrt.scene.text import Declarations, read_declarations, read_file
 from clrt.scene.textures import read_textures, untilted
 from clrt.scene.triangles import flip_x
-from clrt.scene.words import WORDS, Draft
+from clrt.scene.words import WORDS, Draft, Word
 
 _ANYTHING = re.compile(r"[^\s\ufeff]")
 
@@ -66,13 +67,17 @@ def parse_scene(
     if not _ANYTHING.search(text):
         faults.add(1, 1, "the text is empty; a scene has at least the lines E, V, F, R, M and a T or an S")
         faults.raise_if_any()
+    folders = folders or Folders(Path())
+    text, origins = expand(text, source, folders, faults)
     found = read_declarations(text, source, faults)
+    if origins:
+        found.words = [origins.relocated(call, folders) for call in found.words]
     _check_primitives(found, faults)
     _check_materials(found, faults)
     _check_words(found, faults)
-    textured = read_textures(found, folders or Folders(Path()), faults)
-    environment = read_environment(found, folders or Folders(Path()), faults)
-    mesh_lines = read_mesh_lines(found, folders or Folders(Path()), faults)
+    textured = read_textures(found, folders, faults)
+    environment = read_environment(found, folders, faults)
+    mesh_lines = read_mesh_lines(found, folders, faults)
     camera = build_camera(found, right_handed, faults)
     faults.raise_if_any()
     assert camera is not None  # a camera that cannot be built is a fault
@@ -101,6 +106,8 @@ def parse_scene(
     scene = replace(scene, instances=instances)
     scene = with_motion(scene, found, faults)
     faults.raise_if_any()
+    if origins:
+        scene = origins.relined(replace(scene, warnings=tuple(map(origins.told, scene.warnings))))
     return _mirrored(scene) if right_handed else scene
 
 
@@ -159,10 +166,20 @@ def _check_material_words(found: Declarations, faults: Faults) -> None:
             fault = f"{call.name} needs a mirror or glass to make rough; give the M of line {material} a Reflect or a Refract above 0"
         elif word.once and (call.name, material) in first:
             fault = f"a second {call.name} of one material; the first is line {first[call.name, material]}, remove one of the two"
+        elif rival := _rival(word, call.name, material, first):
+            line = first[rival, material]
+            fault = f"{call.name} and {rival} (line {line}) do not go together: a metal-rough material is no mirror or glass; remove one"
         else:
             first[call.name, material] = call.line
             continue
         faults.add(call.line, call.column, fault)
+
+
+def _rival(word: Word, name: str, material: int, first: dict[tuple[str, int], int]) -> str:
+    """The word above, of the same material, that does not go with this one: words of mirrors or glass, and `material`."""
+    polished = [n for n, other in WORDS.items() if other.of in ("glass", "shiny")]
+    rivals = polished if name == "material" else ["material"] if word.of in ("glass", "shiny") else []
+    return next((n for n in rivals if (n, material) in first), "")
 
 
 def _check_absorption(objects: tuple[MeshObject, ...], materials: list[Material], found: Declarations, faults: Faults) -> None:

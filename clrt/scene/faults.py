@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 from clrt.errors import SceneError
+
+if TYPE_CHECKING:
+    from clrt.scene.include import Origins
 
 MOST_TOLD = 20  #: errors written out before the rest is only counted
 LONGEST_SHOWN = 40  #: characters of an offending token that a message repeats
@@ -26,10 +30,11 @@ def did_you_mean(token: str, valid: Iterable[str]) -> str:
 
 
 class Faults:
-    """Errors with their places, of one source. Lines and columns count characters from 1."""
+    """Errors with their places, of one source. Lines and columns count from 1; `origins` knows which lines are of other files."""
 
     def __init__(self, source: str) -> None:
         self.source = source
+        self.origins: Origins | None = None
         self._found: list[tuple[int, int, str]] = []
         self._lines: set[int] = set()
 
@@ -46,8 +51,14 @@ class Faults:
         if not self._found:
             return
         found = sorted(self._found, key=lambda fault: fault[:2])
-        told = [f"{self.source}:{line}:{column}: error: {message}" for line, column, message in found[:MOST_TOLD]]
+        told = [self._told(*fault) for fault in found[:MOST_TOLD]]
         more = len(found) - len(told)
         if more:
             told.append(f"{self.source}: {more} more error{'s' if more > 1 else ''} not shown")
         raise SceneError("\n".join(told))
+
+    def _told(self, line: int, column: int, message: str) -> str:
+        if self.origins is None:
+            return f"{self.source}:{line}:{column}: error: {message}"
+        source, number = self.origins.place(line)
+        return f"{source}:{number}:{column}: error: {self.origins.told(message)}"

@@ -40,7 +40,7 @@ class Folders:
         if not any(path.is_relative_to(folder.resolve()) for folder in (self.own, *self.allowed)):
             raise PictureError(f"{name} leads out of the scene's folder; permit its folder with --allow-path, or move the file")
         if path.is_dir():
-            raise PictureError(f"{name} is a folder; name a picture in it")
+            raise PictureError(f"{name} is a folder; name a file in it")
         if not path.is_file():
             raise PictureError(f"there is no file {name}{_nearby(path)}")
         return path

@@ -100,6 +100,11 @@ def decode(data: bytes, source: str) -> str:
     raise SceneError(f"{source}:{line}:{column}: error: found the byte 0x{data[end]:02x}, {what}")
 
 
+def plain_lines(text: str) -> list[str]:
+    """The lines of a text with any line ends, without a byte order mark."""
+    return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
 def read_declarations(text: str, source: str, faults: Faults, *, bulk: bool = True) -> Declarations:
     """Read all lines; faults are noted, and the lines that have them kept apart.
 

@@ -1,4 +1,4 @@
-"""The word of meshes from files, whose lines scene/mesh_lines.py reads."""
+"""Words of other files: mesh, whose lines scene/mesh_lines.py reads, and include, which scene/include.py follows."""
 
 from __future__ import annotations
 
@@ -12,4 +12,7 @@ _KEYS: tuple[tuple[Field | Text | Choice, Value], ...] = (
     (Choice("materials", ("file", "above")), "file"), (Text("name"), ""), (HIDDEN, "no"),
 )  # fmt: skip
 
-WORDS: dict[str, Word] = {"mesh": Word((Text("file"),), "mesh bunny.obj scale=0.5 turn_y=90", no_change, _KEYS, once=False)}
+WORDS: dict[str, Word] = {
+    "include": Word((Text("file"),), "include lamps.txt", no_change, once=False),
+    "mesh": Word((Text("file"),), "mesh bunny.obj scale=0.5 turn_y=90", no_change, _KEYS, once=False),
+}
