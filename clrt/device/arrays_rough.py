@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device.ggx_albedo import lobe_table
+from clrt.device.ggx_albedo import lobe_table, share_table
 from clrt.device.ggx_glass import glass_row, index_ratios
 from clrt.device.packed import Packed
 
@@ -15,6 +15,11 @@ from clrt.device.packed import Packed
 def facet_albedos(packed: Packed) -> NDArray[Any]:
     """(GGX_ROUGHNESSES, GGX_COSINES) of ggx.cl."""
     return lobe_table().astype(packed.real)
+
+
+def diffuse_shares(packed: Packed) -> NDArray[Any]:
+    """(GGX_ROUGHNESSES, METAL_SHARES) of metal_rough.cl."""
+    return share_table().astype(packed.real)
 
 
 def glass_albedos(packed: Packed) -> NDArray[Any]:

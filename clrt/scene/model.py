@@ -138,6 +138,10 @@ class Material:
         """Whether its opacity holds for what is seen, not for shadows alone."""
         return self.opacity_of == "all"
 
+    def without_phong(self) -> Material:
+        """The material without the parts that a metal-rough one does not have: Ka, Kd, Ks, Reflect, Refract and what belongs to them."""
+        return replace(self, ambient=0.0, diffuse=0.0, specular=0.0, reflect=0.0, refract=0.0, gloss=0.0, fresnel=False)
+
 
 @dataclass(frozen=True, eq=False)
 class Picture:
