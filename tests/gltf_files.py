@@ -41,7 +41,8 @@ class Gltf:
         """An accessor of an array (n,) or (n, width)."""
         rows = np.atleast_2d(np.asarray(values).T).T
         view = self.view(rows.astype(f"<{kind}").tobytes())
-        return self.list("accessors", {"bufferView": view, "componentType": KINDS[kind], "count": len(rows), "type": TYPES[rows.shape[1]], **keys})
+        item = {"bufferView": view, "componentType": KINDS[kind], "count": len(rows), "type": TYPES[rows.shape[1]], **keys}
+        return self.list("accessors", item)
 
     def mesh(self, points: Any, order: Any = None, uv: Any = None, normals: Any = None, **primitive: Any) -> int:
         attributes = {"POSITION": self.array(points)}

@@ -60,8 +60,8 @@ def test_pictures_of_an_included_text_are_found_beside_it(tmp_path: Path) -> Non
 
 def test_fault_has_the_place_in_its_file(tmp_path: Path) -> None:
     with pytest.raises(SceneError) as caught:
-        scene(tmp_path, main="# scene\n" + CAMERA + "include parts/a.txt\nL 1 2\n", parts__a="M 1 1 1 0.1 0.9 0.3 20 0\ninclude b.txt\nS 0 0 x 1\n",
-              parts__b="\n  V 0 0 1\n")  # fmt: skip
+        body = "M 1 1 1 0.1 0.9 0.3 20 0\ninclude b.txt\nS 0 0 x 1\n"
+        scene(tmp_path, main="# scene\n" + CAMERA + "include parts/a.txt\nL 1 2\n", parts__a=body, parts__b="\n  V 0 0 1\n")
     assert str(caught.value).replace(str(tmp_path), "").splitlines() == [
         "/parts/b.txt:2:3: error: a second V line; the first is line 3, remove one of the two",
         '/parts/a.txt:3:7: error: expected a number (z of the centre), found "x"',
@@ -96,7 +96,7 @@ def test_lines_of_the_scene_are_those_of_its_own_text(tmp_path: Path) -> None:
         ({"main": "include main.txt"}, r"main\.txt:1:9: error: main\.txt includes itself: main\.txt -> main\.txt"),
         ({"main": "include a.txt", "a": "\n include b.txt", "b": "include a.txt"},
          r"b\.txt:1:9: error: a\.txt includes itself: a\.txt -> b\.txt -> a\.txt"),
-        ({"main": "include ../other.txt"}, r"main\.txt:1:9: error: \.\./other\.txt leads out of the scene's folder; permit its folder with"),
+        ({"main": "include ../other.txt"}, r"main\.txt:1:9: error: \.\./other\.txt leads out of the scene's folder; permit"),
         ({"main": "include"}, r'main\.txt:1:1: error: include takes 1 value, as in "include lamps\.txt", found 0'),
         ({"main": 'include "a.txt'}, r"main\.txt:1:9: error: expected a second double quote"),
         ({"main": "include sub", "sub__x": ""}, r"main\.txt:1:9: error: sub is a folder; name a file in it"),
