@@ -23,7 +23,7 @@ static __attribute__((noinline)) void environment_find(global const Frame *frame
 }
 
 //@hook light
-        const mask_n escaped = rays.active & ~hit.found;
+        const mask_n escaped = HAVE_ENVIRONMENT ? rays.active & ~hit.found : (mask_n)0;
         real_n sky[3] = {(real_n)0, (real_n)0, (real_n)0};
         if (any_lane(escaped)) {
             real direction[3 * LANES];
@@ -36,5 +36,5 @@ static __attribute__((noinline)) void environment_find(global const Frame *frame
         }
 //@end
 //@hook channel
-            seen = choose(hit.found, seen, sky[a]);
+            if (HAVE_ENVIRONMENT) seen = choose(hit.found, seen, sky[a]);
 //@end

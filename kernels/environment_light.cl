@@ -84,7 +84,7 @@ HOT void environment_light(const Geometry *geometry, global const Frame *frame, 
 }
 
 //@hook light
-        if (any_lane(hit.found)) {
+        if (HAVE_ENVIRONMENT_LIGHT && any_lane(hit.found)) {
             int from_eye = 1, goes_on = 0;
             //@ light_origin
             //@ light_draws

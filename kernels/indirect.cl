@@ -61,14 +61,14 @@ HOT real_n indirect_scatter(global const Material *materials, const Draws *draws
 }
 
 //@hook shade_begin
-        ambient = (real_n)0;  // stands for what is traced here
+        if (HAVE_INDIRECT) ambient = (real_n)0;  // stands for what is traced here
         real_n surface_color[3];
 //@end
 //@hook channel
             surface_color[a] = albedo;
 //@end
 //@hook spawn
-        if (current.depth_left > 0) {
+        if (HAVE_INDIRECT && current.depth_left > 0) {
             real_n direction[3], total;
             const real_n chance = indirect_scatter(materials, &draws, path, &rays, &hit, direction, &total);
             mask_n kept = hit.found & is_greater(chance, (real_n)0) & is_greater(weight * total, (real_n)0);
@@ -95,7 +95,7 @@ HOT real_n indirect_scatter(global const Material *materials, const Draws *draws
 //@end
 //@hook scatter_share
     // Directions that scattered rays draw, too.
-    if (goes_on) {
+    if (HAVE_INDIRECT && goes_on) {
         real_n scatter_exponent, highlight;
         indirect_total(materials, hit, &scatter_exponent, &highlight);
         amount *= mis_share(chance, indirect_density(rays, hit, to_light, scatter_exponent, highlight));

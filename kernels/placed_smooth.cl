@@ -24,18 +24,18 @@ HOT void placed_vectors(const Geometry *geometry, const Hit *hit, real_n *v, con
     for (int a = 0; a < 3; a++) hit->point[a] = local_point[a];
 //@end
 //@hook hit_surface
-    for (int a = 0; a < 3; a++) hit->point[a] = world_point[a];
+    for (int a = 0; a < 3; a++) hit->point[a] = choose(placed, world_point[a], hit->point[a]);
 //@end
 //@hook placed_faced
     const real_n world_geometric[3] = {hit->geometric[0], hit->geometric[1], hit->geometric[2]};
     const real_n world_normal[3] = {hit->normal[0], hit->normal[1], hit->normal[2]};
-    for (int a = 0; a < 3; a++) hit->point[a] = local_point[a];
+    for (int a = 0; a < 3; a++) hit->point[a] = choose(placed, local_point[a], hit->point[a]);
     placed_vectors(geometry, hit, hit->geometric, 0);
     placed_vectors(geometry, hit, hit->normal, 0);
 //@end
 //@hook hit_faced
     for (int a = 0; a < 3; a++) {
-        hit->point[a] = world_point[a];
+        hit->point[a] = choose(placed, world_point[a], hit->point[a]);
         hit->geometric[a] = world_geometric[a];
         hit->normal[a] = world_normal[a];
     }

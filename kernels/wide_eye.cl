@@ -2,14 +2,15 @@
 // Needs: sampling.cl, scene.cl.  Reads: nothing.
 
 //@hook sample_origin
-    extent = frame->extent;
+    if (HAVE_WIDE_EYE) extent = frame->extent;
 //@end
 //@hook trace_default
-        scene_trace(&geometry, &rays, 0, 0, &hits);
+        if (HAVE_WIDE_EYE) scene_trace(&geometry, &rays, 0, 0, &hits);
+        else scene_trace(&geometry, &rays, 1, 0, &hits);
 //@end
 //@hook bounce_begin
-    current.from_eye = 0;
+    if (HAVE_WIDE_EYE) current.from_eye = 0;
 //@end
 //@hook light_origin
-            from_eye = 0;
+            if (HAVE_WIDE_EYE) from_eye = 0;
 //@end

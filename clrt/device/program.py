@@ -180,6 +180,8 @@ def compose(features: Features, precision: Precision, lanes: int, shape: Shape, 
     files = list(_files(features, precision, entry))
     if counting:
         files.insert(0, "count.cl")
+    if features.every:
+        files.insert(0, "switches.cl")
     hooks: dict[str, list[tuple[str, str, int]]] = {
         "parameters": [("features", f"                   , {c}\n", 1) for f in features.active for _, c in f.parameters],
         "arguments": [("features", f"                  , {name}\n", 1) for f in features.active for name, _ in f.parameters],

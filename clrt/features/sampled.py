@@ -42,7 +42,7 @@ AREA_SHADOWS = Feature(
     rays=("shadow",),
     needs=(AREA_LIGHT,),
 )
-INDIRECT = Feature("indirect", indirect_caller, "indirect.cl", rays=("indirect",), branches=1, sampled=True)
+INDIRECT = Feature("indirect", indirect_caller, "indirect.cl", rays=("indirect",), branches=1, sampled=True, switch=True)
 CLAMP = Feature(
     "clamp",
     _clamp_caller,

@@ -26,9 +26,9 @@ def _turn(scene: Scene) -> float:
 
 
 def _is_lit(material: Material) -> bool:
-    """The surface hands on light from all around; mirrors and polished glass show it to their own rays alone."""
+    """The surface hands on light from all around; polished mirrors, and glass, show it to their own rays alone."""
     phong = max(material.color) > 0.0 and max(material.diffuse, material.specular) > 0.0
-    return phong or material.metal_rough or material.gloss > 0.0
+    return phong or material.metal_rough or (material.gloss > 0.0 and material.reflect > 0.0)
 
 
 def light_caller(scene: Scene) -> int | None:
@@ -48,6 +48,7 @@ ENVIRONMENT = Feature(
         ("environment_height", np.int32, lambda scene: _of(scene).radiance.shape[0]),
     ),
     parameters=(("environment_cells", "global const real *environment_cells"),),
+    switch=True,
 )
 ENVIRONMENT_LIGHT = Feature(
     "environment light",
@@ -60,6 +61,7 @@ ENVIRONMENT_LIGHT = Feature(
     ),
     sampled=True,
     needs=(ENVIRONMENT,),
+    switch=True,
 )
 ENVIRONMENT_SHADOWS = Feature(
     "environment shadows",
