@@ -22,20 +22,26 @@
 //@hook accept
     if (any_lane(hit & is_at_least(rays->after, NO_LANES))) {
         lane_int last[LANES], later[LANES];
+        real_n along = t;
         store_lanes(rays->after, last);
         for (int k = 0; k < LANES; k++)
             later[k] = last[k] < 0 || geometry->surfaces[slot].prim > geometry->surfaces[last[k]].prim ? -1 : 0;
-        hit &= is_less(rays->after, NO_LANES) | is_greater(t, rays->after_t) | (is_equal(t, rays->after_t) & load_lanes(later));
+        //@ after_order
+        hit &= is_less(rays->after, NO_LANES) | is_greater(along, rays->after_t) | (is_equal(along, rays->after_t) & load_lanes(later));
     }
 //@end
 //@hook accept_sure
-    hit &= is_less(rays->after, NO_LANES) | is_greater(t - error, rays->after_t);
+    real_n along = t - error;
+    //@ after_sure
+    hit &= is_less(rays->after, NO_LANES) | is_greater(along, rays->after_t);
 //@end
 //@hook exact_accept
         lane_int last[LANES];
         store_lanes(rays->after, last);
         if (hit && last[k] >= 0) {
-            const int order = exact_nearer(geometry, origin, direction, slot, &plane, last[k], &stage);
+            int order;
+            //@ after_exact
+            order = exact_nearer(geometry, origin, direction, slot, &plane, last[k], &stage);
             hit = order > 0 || (order == 0 && geometry->surfaces[slot].prim > geometry->surfaces[last[k]].prim);
         }
 //@end

@@ -34,6 +34,7 @@ HOT real alpha_at(global const Texture *texture, global const uchar *texels, dou
         if (material->alpha_texture >= 0) {
             double point[3], uv[2] = {0, 0};
             for (int a = 0; a < 3; a++) point[a] = where[a * LANES + k];
+            //@ texture_point
             texture_coordinates(geometry, geometry->corner_uvs, (int)slot[k], point, uv);
             kept[k] *= alpha_at(geometry->textures + material->alpha_texture, geometry->texels, uv[0], uv[1], material->alpha_cutoff);
         }

@@ -7,19 +7,23 @@
 // the texels and the place on the picture are. A sphere's x runs along its circle of latitude, its y up along its meridian.
 #define NORMALMAP_LEAST_TURN 0x1p-40  // sine of the angle between the edges on the picture up to which they are on a line
 
-// Unit vectors x, y for N, or 0 where the corners' places lie on a line: no frame, no tilt.
-HOT int normalmap_on_triangle(const Geometry *geometry, global const double *corner_uvs, int slot, const double *n, double *x, double *y) {
+// How a point of the triangle moves as u grows, and as v does; 0 where the corners' places lie on a line: no frame, no tilt.
+HOT int normalmap_moves(const Geometry *geometry, global const double *corner_uvs, int slot, double *along_u, double *along_v) {
     global const double *v = geometry->vertices + 9 * (size_t)slot, *corner = corner_uvs + 6 * (size_t)slot;
     const double a[2] = {corner[2] - corner[0], corner[3] - corner[1]}, b[2] = {corner[4] - corner[0], corner[5] - corner[1]};
     const double det = a[0] * b[1] - a[1] * b[0];
     if (!(fabs(det) > NORMALMAP_LEAST_TURN * sqrt((a[0] * a[0] + a[1] * a[1]) * (b[0] * b[0] + b[1] * b[1])))) return 0;
-    double along_v[3];
     for (int i = 0; i < 3; i++) {
         const double e1 = v[3 + i] - v[i], e2 = v[6 + i] - v[i];
-        x[i] = (b[1] * e1 - a[1] * e2) / det;
+        along_u[i] = (b[1] * e1 - a[1] * e2) / det;
         along_v[i] = (a[0] * e2 - b[0] * e1) / det;
     }
-    const double off = dot_double(x, n), whole = dot_double(x, x);
+    return 1;
+}
+
+// Makes unit vectors x and y of these, for N; 0 where u grows along N alone.
+HOT int normalmap_upright(const double *n, double *x, double *y) {
+    const double off = dot_double(x, n), whole = dot_double(x, x), along_v[3] = {y[0], y[1], y[2]};
     for (int i = 0; i < 3; i++) x[i] -= off * n[i];
     const double square = dot_double(x, x);
     if (!(square > NORMALMAP_LEAST_TURN * whole)) return 0;
@@ -32,10 +36,10 @@ HOT int normalmap_on_triangle(const Geometry *geometry, global const double *cor
 
 static __attribute__((noinline)) void normalmap_lanes(const Geometry *geometry, global const Material *materials, global const Texture *textures,
                                                       global const uchar *texels, global const real *texel_values,
-                                                      global const double *corner_uvs, const lane_int *found, const lane_int *slots,
+                                                      global const double *corner_uvs, const lane_int *found, const lane_int *slot,
                                                       const lane_int *material, const real *where, real *normal) {
     for (int k = 0; k < LANES; k++) {
-        const int map = materials[material[k]].normal_map, slot = (int)slots[k];
+        const int map = materials[material[k]].normal_map;
         if (!found[k] || map < 0) continue;
         double point[3], n[3], x[3], y[3], uv[2] = {0, 0};
         int framed = 0;
@@ -43,10 +47,14 @@ static __attribute__((noinline)) void normalmap_lanes(const Geometry *geometry, 
             point[a] = where[a * LANES + k];
             n[a] = normal[a * LANES + k];
         }
-        if (slot < geometry->slot_count) framed = normalmap_on_triangle(geometry, corner_uvs, slot, n, x, y);
+        if (slot[k] < geometry->slot_count && normalmap_moves(geometry, corner_uvs, (int)slot[k], x, y)) {
+            //@ normalmap_moved
+            framed = normalmap_upright(n, x, y);
+        }
         //@ normalmap_frame
         if (!framed) continue;
-        texture_coordinates(geometry, corner_uvs, slot, point, uv);
+        //@ texture_point
+        texture_coordinates(geometry, corner_uvs, (int)slot[k], point, uv);
         real color[3];
         texture_color(textures + map, texels, texel_values, uv[0], uv[1], color);
         const double strength = materials[material[k]].normal_strength;
@@ -58,8 +66,8 @@ static __attribute__((noinline)) void normalmap_lanes(const Geometry *geometry, 
 }
 
 HOT void normalmap_tilt(const Geometry *geometry, global const Material *materials, global const Texture *textures, global const uchar *texels,
-                        global const real *texel_values, global const double *corner_uvs, Hit *hit) {
-    const Geometry seen = *geometry;
+                        global const real *texel_values, global const double *corner_uvs, const Rays *rays, Hit *hit) {
+    Geometry seen = *geometry;
     lane_int found[LANES], slot[LANES], material[LANES];
     real where[3 * LANES], normal[3 * LANES];
     store_lanes(hit->found, found);
@@ -71,11 +79,13 @@ HOT void normalmap_tilt(const Geometry *geometry, global const Material *materia
         store_lanes(hit->point[a], where + a * LANES);
         store_lanes(hit->normal[a], normal + a * LANES);
     }
+    //@ texture_where
+    //@ normalmap_where
     normalmap_lanes(&seen, materials, textures, texels, texel_values, corner_uvs, found, slot, material, where, normal);
     for (int a = 0; a < 3; a++) hit->normal[a] = load_lanes(normal + a * LANES);
     face_towards(hit->normal, hit->geometric, 0);
 }
 
 //@hook arrived
-        normalmap_tilt(&geometry, materials, textures, texels, texel_values, corner_uvs, &hit);
+        normalmap_tilt(&geometry, materials, textures, texels, texel_values, corner_uvs, &rays, &hit);
 //@end

@@ -13,5 +13,5 @@ HOT int normalmap_on_sphere(global const Sphere *sphere, const double *point, do
 }
 
 //@hook normalmap_frame
-        if (slot >= geometry->slot_count) framed = normalmap_on_sphere(geometry->spheres + (slot - geometry->slot_count), point, x, y);
+        if (slot[k] >= geometry->slot_count) framed = normalmap_on_sphere(geometry->spheres + (slot[k] - geometry->slot_count), point, x, y);
 //@end

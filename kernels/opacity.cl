@@ -2,19 +2,20 @@
 // Needs: opaque.cl, hit.cl; bounce.cl, where rays go on.  Reads: nothing.
 
 // 1 where nothing was hit: the background is whole.
-HOT real_n opacity_solid(const Geometry *geometry, global const Material *materials, const Hit *hit) {
+HOT real_n opacity_solid(const Geometry *geometry, global const Material *materials, const Rays *rays, const Hit *hit) {
     lane_int slot[LANES], found[LANES];
     real where[3 * LANES], kept[LANES];
     store_lanes(hit->found, found);
     for (int k = 0; k < LANES; k++) slot[k] = found[k] && materials[hit->material[k]].opacity_seen ? hit->slot[k] : -1;
     for (int a = 0; a < 3; a++) store_lanes(hit->point[a], where + a * LANES);
+    //@ texture_where
     const Geometry seen = *geometry;
     opaque_at(&seen, slot, where, kept);
     return choose(is_less(load_lanes(slot), NO_LANES), (real_n)1, load_lanes(kept));
 }
 
 //@hook arrived
-        const real_n whole = weight, solid = opacity_solid(&geometry, materials, &hit);
+        const real_n whole = weight, solid = opacity_solid(&geometry, materials, &rays, &hit);
         weight *= solid;
 //@end
 //@hook bounce_weights

@@ -25,9 +25,11 @@ static __attribute__((noinline)) void opacity_through(const Geometry *geometry, 
         real_n t = hits.t;
         //@ opacity_distance
         for (int a = 0; a < 3; a++) store_lanes(choose(blocked, ray_point(&rays, t, a), (real_n)0), where + a * LANES);
+        //@ opacity_where
         opaque_at(geometry, slot, where, kept);
         left *= pass < OPACITY_MOST ? R(1.0) - load_lanes(kept) : choose(blocked, (real_n)0, (real_n)1);
         blocked &= is_greater(left, (real_n)0);
+        //@ opacity_after
         rays.after = choose(blocked, hits.slot, rays.after);
         rays.after_t = choose(blocked, hits.t, rays.after_t);
     }

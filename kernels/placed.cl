@@ -33,6 +33,7 @@ HOT void placed_trace(const Geometry *geometry, const int place, const Rays *ray
         inner.t_max = rays->t_max * length;
         found.t = hits->t * length;
         rays_prepare(&inner, R(0.0));
+        //@ placed_prepared
     }
     inner.skip = choose(is_equal(rays->skip_place, (mask_n)number), rays->skip, (mask_n)-1);
     found.slot = (mask_n)-1;
@@ -133,6 +134,9 @@ HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit
 //@end
 //@hook reach_start
     towards.skip_place = load_lanes(hit->place);
+//@end
+//@hook refine_lane
+        if (hit->place[k] >= 0) continue;  // its vertices are elsewhere; the point and its error hold
 //@end
 //@hook media_own
         if (hit->place[k] >= 0) own[k] = hit->medium[k];

@@ -12,6 +12,7 @@ static __attribute__((noinline)) void texture_lanes(const Geometry *geometry, gl
         if (!found[k] || texture < 0) continue;
         double point[3], uv[2] = {0, 0};
         for (int a = 0; a < 3; a++) point[a] = where[a * LANES + k];
+        //@ texture_point
         texture_coordinates(geometry, corner_uvs, (int)slot[k], point, uv);
         real color[3];
         texture_color(textures + texture, texels, texel_values, uv[0], uv[1], color);
@@ -20,7 +21,7 @@ static __attribute__((noinline)) void texture_lanes(const Geometry *geometry, gl
 }
 
 HOT void texture_tints(const Geometry *geometry, global const Material *materials, global const Texture *textures, global const uchar *texels,
-                       global const real *texel_values, global const double *corner_uvs, const Hit *hit, real_n *tint) {
+                       global const real *texel_values, global const double *corner_uvs, const Rays *rays, const Hit *hit, real_n *tint) {
     // Copies go to the function: what it is given by pointer could not stay in registers here.
     const Geometry seen = *geometry;
     lane_int found[LANES], slot[LANES], material[LANES];
@@ -31,13 +32,14 @@ HOT void texture_tints(const Geometry *geometry, global const Material *material
         material[k] = hit->material[k];
     }
     for (int a = 0; a < 3; a++) store_lanes(hit->point[a], where + a * LANES);
+    //@ texture_where
     texture_lanes(&seen, materials, textures, texels, texel_values, corner_uvs, found, slot, material, where, color);
     for (int a = 0; a < 3; a++) tint[a] = load_lanes(color + a * LANES);
 }
 
 //@hook light
         real_n tint[3];
-        texture_tints(&geometry, materials, textures, texels, texel_values, corner_uvs, &hit, tint);
+        texture_tints(&geometry, materials, textures, texels, texel_values, corner_uvs, &rays, &hit, tint);
 //@end
 //@hook albedo
             albedo *= tint[a];

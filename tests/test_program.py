@@ -14,6 +14,7 @@ from clrt.device.program import Shape
 from clrt.errors import ClrtError, DeviceError, LimitError
 from clrt.features import FEATURES, Feature, Features
 from clrt.precision import RUNGS, rung
+from feature_sets import NAMES, all_but, mixed_sets, with_needs
 
 SHAPE = Shape(stack=16, depth=5)
 ALL = Features(tuple((f.name, 0) for f in FEATURES))
@@ -37,6 +38,10 @@ WORDS = {
     "area shadows": ("arealight_shadow",),
     "area light mis": ("arealight_mis",),
     "round area light": ("arealight_sphere",),
+    "environment": ("environment_find", "environment_cells"),
+    "environment light": ("environment_light", "environment_draw"),
+    "environment shadows": ("environment_shadow",),
+    "environment mis": ("environment_mis",),
     "indirect": ("indirect",),
     "clamp": ("radiance_clamp",),
     "sun": ("sun_light", "suns"),
@@ -44,7 +49,16 @@ WORDS = {
     "absorption": ("absor",),
     "refraction": ("refract", "ior", "media"),
     "mirror": ("mirror", "reflect;"),
-    "textures": ("textur", "texel", "albedo *="),
+    "textures": ("texture_tint", "albedo *="),
+    "pictures": ("textur", "texel"),
+    "normal map": ("normalmap",),
+    "round normal map": ("normalmap_on_sphere",),
+    "opacity": ("opaque_at",),
+    "opacity seen": ("opacity_solid",),
+    "opacity shadows": ("opacity_through", "let_through"),
+    "hits in order": ("rays->after",),
+    "round opacity": ("opaque_sphere",),
+    "alpha": ("alpha_at", "alpha_texel"),
     "globe": ("globe", "atan2pi"),
     "bounce": ("bounce",),
     "sampler": ("sampler",),
@@ -55,10 +69,6 @@ WORDS = {
 }
 
 
-def _features(*names: str) -> Features:
-    return Features(tuple((f.name, 0) for f in FEATURES if f.name in names))
-
-
 def _traces(feature: Feature, source: str) -> list[str]:
     members = [f" {name};" for name, *_ in feature.material + feature.frame]
     words = [feature.kernel, *WORDS[feature.name], *(name for name, _ in feature.parameters), *members]
@@ -67,24 +77,9 @@ def _traces(feature: Feature, source: str) -> list[str]:
 
 @pytest.mark.parametrize("feature", FEATURES, ids=lambda f: f.name)
 def test_source_without_an_effect_holds_none_of_its_names(feature: Feature) -> None:
-    others = _features(*(f.name for f in FEATURES if f.name != feature.name))
     with_it = program.compose(ALL, rung("watertight"), 16, SHAPE)
     assert _traces(feature, with_it), "the words looked for must occur where the effect is on"
-    dependents = {
-        "direct light": ("shadows", "spot", "falloff"), "sun": ("sun shadows",), "bounce": ("mirror", "refraction", "fresnel", "absorption"),
-        "refraction": ("fresnel", "absorption"), "textures": ("globe",), "spheres": ("globe",),
-    }.get(feature.name, ())  # fmt: skip
-    dependents += {"sampler": ("sampling", "samples", "lens"), "sampling": ("samples", "lens")}.get(feature.name, ())
-    drawing = ("area light", "area shadows", "area light mis", "round area light", "indirect", "path", "path bounce", "scatter", "mis")
-    dependents += {
-        "sampler": drawing, "sampling": drawing, "path": drawing, "spheres": ("round area light",), "scatter": drawing,
-        "bounce": ("path bounce", "throughput", "mis", "area light mis", "round area light", "indirect", "clamp"),
-        "throughput": ("absorption", "indirect"), "added": drawing, "reach": ("sun shadows", "area shadows"),
-        "mis": ("area light mis", "round area light", "indirect"), "area light": ("area shadows", "area light mis", "round area light"),
-        "area light mis": ("round area light",), "indirect": ("clamp",), "path bounce": ("indirect",),
-    }.get(feature.name, ())  # fmt: skip
-    left = Features(tuple(pair for pair in others.lines if pair[0] not in dependents))
-    assert _traces(feature, program.compose(left, rung("watertight"), 16, SHAPE)) == []
+    assert _traces(feature, program.compose(all_but(feature), rung("watertight"), 16, SHAPE)) == []
 
 
 def test_plain_source_holds_no_effect_and_no_mark() -> None:
@@ -118,21 +113,26 @@ def test_line_directives_are_true(device: Device) -> None:
         program.build(device, broken)
 
 
-NAMES = [f.name for f in FEATURES if f.name != "bounce"]
-PAIRS = [pytest.param(pair, marks=pytest.mark.slow) for pair in itertools.combinations(NAMES, 2)]
+WIDTHS = (16, 8, 4, 1)
+MIXED = mixed_sets(16)
 
 
-@pytest.mark.parametrize("names", [*((name,) for name in NAMES), *PAIRS], ids=lambda names: "+".join(names))
-def test_effects_and_pairs_of_them_compile_for_any_width(device: Device, names: tuple[str, ...]) -> None:
-    wanted = {*names}
-    wanted |= {"refraction"} if {"fresnel", "absorption"} & wanted else set()
-    wanted |= {"bounce"} if {"mirror", "refraction"} & wanted else set()
-    wanted |= {"spheres", "textures"} if "globe" in wanted else set()
-    wanted |= {"direct light"} if {"shadows", "spot", "falloff"} & wanted else set()
-    wanted |= {"sun"} if "sun shadows" in wanted else set()
-    wanted |= {"sampler", "sampling"} if "samples" in wanted else set()
-    lanes = {0: 16, 1: 8, 2: 4, 3: 1}[sum(map(ord, "".join(names))) % 4]
-    program.build(device, program.compose(_features(*wanted), rung("watertight"), lanes, SHAPE))
+@pytest.mark.parametrize("name", [f.name for f in FEATURES])
+def test_each_effect_with_what_it_needs_compiles_for_any_width(device: Device, name: str) -> None:
+    features = with_needs([name])
+    assert name in {f.name for f in features.active}
+    program.build(device, program.compose(features, rung("watertight"), WIDTHS[sum(map(ord, name)) % 4], SHAPE))
+
+
+def test_all_pairs_of_effects_meet_in_some_mixed_set() -> None:
+    sets = [{f.name for f in features.active} for features in MIXED]
+    assert [pair for pair in itertools.combinations(NAMES, 2) if not any({*pair} <= names for names in sets)] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(len(MIXED)))
+def test_mixed_sets_of_effects_compile(device: Device, number: int) -> None:
+    program.build(device, program.compose(MIXED[number], rung("watertight"), WIDTHS[number % 4], SHAPE))
 
 
 def test_stack_size_covers_the_depth() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.features import lamps, sampled, shapes, surfaces, surroundings
+from clrt.features import lamps, placed, sampled, shapes, surfaces, surroundings
 from clrt.features.feature import REAL, Caller, Feature, Joint, used_materials
 from clrt.scene.model import Material, Scene
 
@@ -51,6 +51,7 @@ OPACITY_SHADOWS = Feature(
     "opacity_shadow.cl",
     helper=True,
 )
+OPACITY_PLACED = Feature("placed opacity", Joint((OPACITY_SHADOWS, placed.PLACED), every=True), "opacity_placed.cl", helper=True)
 AFTER = Feature("hits in order", Joint((OPACITY_SHADOWS,)), "after.cl", helper=True)
 OPACITY_SPHERE = Feature("round opacity", Joint((OPACITY, shapes.SPHERES), every=True), "opaque_sphere.cl", helper=True)
 ALPHA = Feature(
@@ -65,6 +66,7 @@ NORMAL_MAP = Feature(
     "normal map", _map_caller("normal_map"), "normalmap.cl", material=(("normal_map", np.int32), ("normal_strength", REAL))
 )
 NORMAL_GLOBE = Feature("round normal map", Joint((NORMAL_MAP, shapes.SPHERES), every=True), "normalmap_globe.cl", helper=True)
+NORMAL_PLACED = Feature("placed normal map", Joint((NORMAL_MAP, placed.PLACED), every=True), "normalmap_placed.cl", helper=True)
 PICTURES = Feature(
     "pictures",
     Joint((surfaces.TEXTURES, ALPHA, NORMAL_MAP)),
