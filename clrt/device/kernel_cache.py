@@ -96,6 +96,12 @@ def clear_if_one_died() -> bool:
     return True
 
 
+def suspect() -> None:
+    """An entry is broken: the folder is emptied as if a process had died, once no other process is loading from it."""
+    with suppress(OSError):
+        Path(os.environ.get(VARIABLE, tempfile.gettempdir()), f"{_MARK}0").touch()
+
+
 def _alive(process: str) -> bool:
     return process.isdigit() and Path("/proc", process).exists()
 

@@ -204,11 +204,19 @@ def private_bytes(precision: Precision, lanes: int, shape: Shape, features: Feat
     # Refraction: for coincident walls.
     copies = 1 + sum(name in names for name in ("bounce", "shadows", "sun shadows", "opacity shadows", "refraction"))
     traversal = shape.stack * (2 * lane_bytes + 4) * copies
+    if "object tree" in names:
+        traversal += shape.tree * (lane_bytes + 4) * copies + ("placed" in names) * shape.stack * (2 * lane_bytes + 4) * copies
     return traversal + (entry * (bounce_stack(features, shape.depth) + 2) if "bounce" in names else 0) + (16 << 10)
 
 
 def check_limits(precision: Precision, lanes: int, shape: Shape, features: Features) -> None:
-    """Raises LimitError where a work-group's private memory would not fit a thread's stack, on which PoCL keeps it."""
+    """Raises LimitError where a work-group's private memory would not fit a thread's stack, on which PoCL keeps it, or the rung does not
+    know an effect."""
+    if precision.decides_in_stages and "placed" in dict(features.lines):
+        raise LimitError(
+            f"the precision '{precision.name}' decides between triangles by the numbers as given, which instances and moving objects do not "
+            "have; choose double or watertight"
+        )
     need = private_bytes(precision, lanes, shape, features) * LOCAL_SIZE[0] * LOCAL_SIZE[1]
     if need > PRIVATE_LIMIT:
         raise LimitError(
@@ -234,8 +242,8 @@ def check_options(options: tuple[str, ...]) -> None:
 def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> Any:
     """Compiles `source` on `device`; a pyopencl Program.
 
-    A broken entry of PoCL's cache can fail here; so a build that fails empties the cache and is tried once more, from a text that no
-    cache knows. Raises DeviceError with the compiler's message.
+    A broken entry of PoCL's cache can fail here; so a build that fails is tried once more, from a text that no cache knows. Where that
+    works, the cache is emptied before something is loaded again. Raises DeviceError with the compiler's message.
     """
     import pyopencl as cl
 
@@ -248,8 +256,9 @@ def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> An
                 built = cl.Program(device.context, text).build(options=list(options))
                 for name in _KERNEL.findall(text):  # what a broken entry lacks is missed only when it is asked for
                     cl.Kernel(built, name)
-                return built
+            if error is not None:
+                kernel_cache.suspect()
+            return built
         except cl.Error as failure:
             error = failure
-            kernel_cache.clear()
     raise DeviceError(f"the device '{device.info.name}' could not compile the program: {error}") from error
