@@ -135,9 +135,6 @@ HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit
 //@hook reach_start
     towards.skip_place = load_lanes(hit->place);
 //@end
-//@hook refine_lane
-        if (hit->place[k] >= 0) continue;  // its vertices are elsewhere; the point and its error hold
-//@end
 //@hook media_own
         if (hit->place[k] >= 0) own[k] = hit->medium[k];
 //@end

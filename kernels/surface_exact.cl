@@ -19,7 +19,6 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
     }
     for (int k = 0; k < LANES; k++) {
         if (!lane[k] || hit->slot[k] >= geometry->slot_count) continue;
-        //@ refine_lane
         double origin[3], direction[3], e1[3], e2[3], normal[3], at[3], cross[3], sum = 0, size = 0;
         for (int a = 0; a < 3; a++) {
             origin[a] = shared_origin ? geometry->shared_origin[a] : geometry->local_origin[a] + (double)from[a][k];
