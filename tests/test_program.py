@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from feature_sets import NAMES, all_but, mixed_sets, own_names, traces, with_needs
 
 from clrt.device import program
 from clrt.device.context import Device
@@ -14,78 +15,21 @@ from clrt.device.program import Shape
 from clrt.errors import ClrtError, DeviceError, LimitError
 from clrt.features import FEATURES, Feature, Features
 from clrt.precision import RUNGS, rung
-from feature_sets import NAMES, all_but, mixed_sets, with_needs
 
 SHAPE = Shape(stack=16, depth=5)
 ALL = Features(tuple((f.name, 0) for f in FEATURES))
-#: words that betray an effect, besides the names of its file, arguments and struct members
-WORDS = {
-    "spheres": ("sphere",),
-    "smooth": ("smooth", "corner_normals"),
-    "shadows": ("shadow", "light_planes"),
-    "direct light": ("direct_light",),
-    "spot": ("spot", "slope"),
-    "falloff": ("falloff",),
-    "sun shadows": ("sun_visible",),
-    "reach": ("reach",),
-    "path": ("path_pair", "draws"),
-    "path bounce": ("path_bounce",),
-    "throughput": ("tint[a]",),
-    "added": ("added",),
-    "mis": ("mis_share",),
-    "scatter": ("scatter_phong",),
-    "area light": ("arealight", "emitter"),
-    "area shadows": ("arealight_shadow",),
-    "area light mis": ("arealight_mis",),
-    "round area light": ("arealight_sphere",),
-    "environment": ("environment_find", "environment_cells"),
-    "environment light": ("environment_light", "environment_draw"),
-    "environment shadows": ("environment_shadow",),
-    "environment mis": ("environment_mis",),
-    "indirect": ("indirect",),
-    "clamp": ("radiance_clamp",),
-    "sun": ("sun_light", "suns"),
-    "fresnel": ("fresnel",),
-    "absorption": ("absor",),
-    "refraction": ("refract", "ior", "media"),
-    "mirror": ("mirror", "reflect;"),
-    "textures": ("texture_tint", "albedo *="),
-    "pictures": ("textur", "texel"),
-    "normal map": ("normalmap",),
-    "round normal map": ("normalmap_on_sphere",),
-    "opacity": ("opaque_at",),
-    "opacity seen": ("opacity_solid",),
-    "opacity shadows": ("opacity_through", "let_through"),
-    "hits in order": ("rays->after",),
-    "round opacity": ("opaque_sphere",),
-    "alpha": ("alpha_at", "alpha_texel"),
-    "globe": ("globe", "atan2pi"),
-    "bounce": ("bounce",),
-    "sampler": ("sampler",),
-    "sampling": ("sampling", "sample_range"),
-    "samples": ("antialias",),
-    "lens": ("lens",),
-    "wide eye": ("wide_eye",),
-}
-
-
-def _traces(feature: Feature, source: str) -> list[str]:
-    members = [f" {name};" for name, *_ in feature.material + feature.frame]
-    words = [feature.kernel, *WORDS[feature.name], *(name for name, _ in feature.parameters), *members]
-    return [w for w in words if w.lower() in source.lower()]
 
 
 @pytest.mark.parametrize("feature", FEATURES, ids=lambda f: f.name)
 def test_source_without_an_effect_holds_none_of_its_names(feature: Feature) -> None:
-    with_it = program.compose(ALL, rung("watertight"), 16, SHAPE)
-    assert _traces(feature, with_it), "the words looked for must occur where the effect is on"
-    assert _traces(feature, program.compose(all_but(feature), rung("watertight"), 16, SHAPE)) == []
+    assert own_names(feature) <= set(traces(feature, program.compose(ALL, rung("watertight"), 16, SHAPE))), "they occur where it is on"
+    assert traces(feature, program.compose(all_but(feature), rung("watertight"), 16, SHAPE)) == []
 
 
 def test_plain_source_holds_no_effect_and_no_mark() -> None:
     source = program.compose(Features(()), rung("watertight"), 16, SHAPE)
     for feature in FEATURES:
-        assert _traces(feature, source) == []
+        assert traces(feature, source) == []
     assert "//@" not in source
     assert "count_rays" not in source
 
