@@ -210,13 +210,7 @@ def private_bytes(precision: Precision, lanes: int, shape: Shape, features: Feat
 
 
 def check_limits(precision: Precision, lanes: int, shape: Shape, features: Features) -> None:
-    """Raises LimitError where a work-group's private memory would not fit a thread's stack, on which PoCL keeps it, or the rung does not
-    know an effect."""
-    if precision.decides_in_stages and "placed" in dict(features.lines):
-        raise LimitError(
-            f"the precision '{precision.name}' decides between triangles by the numbers as given, which instances and moving objects do not "
-            "have; choose double or watertight"
-        )
+    """Raises LimitError where a work-group's private memory would not fit a thread's stack, on which PoCL keeps it."""
     need = private_bytes(precision, lanes, shape, features) * LOCAL_SIZE[0] * LOCAL_SIZE[1]
     if need > PRIVATE_LIMIT:
         raise LimitError(
@@ -242,8 +236,8 @@ def check_options(options: tuple[str, ...]) -> None:
 def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> Any:
     """Compiles `source` on `device`; a pyopencl Program.
 
-    A broken entry of PoCL's cache can fail here; so a build that fails is tried once more, from a text that no cache knows. Where that
-    works, the cache is emptied before something is loaded again. Raises DeviceError with the compiler's message.
+    A broken entry of PoCL's cache can fail here; so a build that fails is tried once more, from a text that no cache knows, with the
+    cache emptied first unless somebody else is loading from it. Raises DeviceError with the compiler's message.
     """
     import pyopencl as cl
 
@@ -256,9 +250,8 @@ def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> An
                 built = cl.Program(device.context, text).build(options=list(options))
                 for name in _KERNEL.findall(text):  # what a broken entry lacks is missed only when it is asked for
                     cl.Kernel(built, name)
-            if error is not None:
-                kernel_cache.suspect()
             return built
         except cl.Error as failure:
             error = failure
+            kernel_cache.suspect()
     raise DeviceError(f"the device '{device.info.name}' could not compile the program: {error}") from error
