@@ -23,7 +23,7 @@ from clrt.kdtree.boxtree import depth_limit
 from clrt.kdtree.tree import KdTree
 from clrt.precision import DEFAULT, Precision, rung
 from clrt.scene.model import Scene
-from clrt.scene.placed import placement_count
+from clrt.scene.placed import placement_count, seen
 from clrt.scene.scale import at_working_size
 from clrt.scene.words.frame import MOST_SAMPLES
 from clrt.stats import ObjectStats, RunStats
@@ -32,6 +32,7 @@ Progress = Callable[[str, float], None]
 
 MAX_PIXELS = 1 << 28
 MAX_DEPTH = 128
+DEFAULT_SAMPLES = 16  #: of a pixel, where a scene holds sampled effects and does not say how many
 _LAUNCH_S = 0.15  #: a launch is to take about this long, so that Ctrl-C and progress come between launches
 _FIRST_LAUNCH = 1 << 20  #: rays at most, by a rough count, in the first launch, whose speed is not known yet
 
@@ -113,7 +114,7 @@ def passes(scene: Scene, features: Features) -> int:
 
 def with_options(scene: Scene, size: tuple[int, int] | None, depth: int | None, samples: int | None, seed: int) -> Scene:
     """The scene with what is given in place of its own, at the size that kernels work with. Raises LimitError, ClrtError."""
-    return at_working_size(_with_sampling(_with_size(scene, size, depth), samples, seed))
+    return seen(at_working_size(_with_sampling(_with_size(scene, size, depth), samples, seed)))
 
 
 def _with_size(scene: Scene, size: tuple[int, int] | None, depth: int | None) -> Scene:
@@ -132,7 +133,9 @@ def _with_size(scene: Scene, size: tuple[int, int] | None, depth: int | None) ->
 
 
 def _with_sampling(scene: Scene, samples: int | None, seed: int) -> Scene:
-    samples = scene.samples if samples is None else samples
+    if samples is None:
+        asked = scene.samples_line > 0 or scene.samples > 1
+        samples = scene.samples if asked or not any(f.sampled for f in Features.of(scene).active) else DEFAULT_SAMPLES
     if not 1 <= samples <= MOST_SAMPLES:
         raise LimitError(f"{samples} samples are out of range; a pixel has 1 to {MOST_SAMPLES:,}")
     if not 0 <= seed < 1 << 32:
@@ -167,10 +170,18 @@ def program_shape(prepared: Prepared, features: Features, shared_lights: bool) -
     return program.Shape(program.stack_size(deepest), scene.depth if bounces else 0, shared_lights, program.stack_size(boxes))
 
 
+def _as_called(prepared: Prepared, features: Features) -> Prepared:
+    """Without the instances and the motion that the features leave out."""
+    names = {f.name for f in features.active}
+    scene = seen(prepared.scene, "instances" in names, "motion" in names)
+    return prepared if scene is prepared.scene else build_trees(scene, "sah", lambda phase, fraction: None)
+
+
 def open_tracer(
     prepared: Prepared, features: Features, precision: Precision, device: Device, tell: Progress
 ) -> tuple[Buffers, Tracer, str, float]:
     """Buffers filled and program built; also its source, and the seconds of packing, upload and preparing."""
+    prepared = _as_called(prepared, features)
     tell("compile", 0.0)
     lanes = precision.lanes(device.info.lanes)
     program.check_limits(precision, lanes, program_shape(prepared, features, True), features)

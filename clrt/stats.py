@@ -76,6 +76,11 @@ class RunStats:
     total_s: float = 0.0
 
     @property
+    def bias(self) -> str:
+        """What makes the picture another one than the scene's in the mean, for its label; empty where nothing does."""
+        return "biased: indirect clamp" if "clamp" in self.effects else ""
+
+    @property
     def triangles(self) -> int:
         return sum(o.triangles for o in self.objects)
 
@@ -129,6 +134,7 @@ class RunStats:
             "seed": self.seed,
             "effects": list(self.effects),
             "without": list(self.without),
+            "bias": self.bias,
             **{name: round(getattr(self, name), 6) for name in _TIMES},
             "triangles": self.triangles,
             "nodes": self.nodes,

@@ -96,6 +96,8 @@ def fact_lines(stats: RunStats, picture: Path) -> Table:
         lines.add_row("rays", Text(f"{stats.rays:,}{_per_second(stats.rays_per_s)}  ({kinds})"))
     lines.add_row("device", Text(stats.device))
     lines.add_row("effects", Text(", ".join(stats.effects) or "none"))
+    if stats.bias:
+        lines.add_row("bias", Text(f"{stats.bias}; without the clamp the mean is right"))
     lines.add_row("precision", Text(f"{stats.precision}, {stats.tree} trees"))
     lines.add_row("picture", Text(f"{_printable(picture)}, {stats.width} x {stats.height}"))
     return lines

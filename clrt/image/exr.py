@@ -21,7 +21,7 @@ def check() -> None:
         raise ClrtError("pictures in OpenEXR need OpenImageIO; install it: pip install 'clrt[hdr]', or write a .png")
 
 
-def write(file: BinaryIO, pixels: NDArray[np.float32]) -> None:
+def write(file: BinaryIO, pixels: NDArray[np.float32], comment: str = "") -> None:
     """Write (height, width, 3) float32, whatever they hold, without loss. The same pixels give the same bytes: no date.
 
     Raises ClrtError where the library is not there, OSError where it cannot write.
@@ -33,6 +33,8 @@ def write(file: BinaryIO, pixels: NDArray[np.float32]) -> None:
     spec = oiio.ImageSpec(width, height, channels, "float")
     spec.attribute("compression", "zip")
     spec.attribute("DateTime", "")
+    if comment:
+        spec.attribute("ImageDescription", comment)
     # The library writes to files of a name alone.
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.exr")

@@ -16,7 +16,7 @@ from clrt.files import atomic_write, check_writable
 from clrt.image import exr, png, ppm
 from clrt.stats import RunStats
 
-_WRITERS: dict[str, Callable[[BinaryIO, NDArray[np.uint8], bool], None]] = {".png": png.write, ".ppm": ppm.write}
+_WRITERS: dict[str, Callable[[BinaryIO, NDArray[np.uint8], bool, str], None]] = {".png": png.write, ".ppm": ppm.write}
 _LINEAR = ".exr"  #: holds numbers as they are
 
 _BLOCK_ROWS = 64  #: rows encoded at a time, so that float64 work arrays stay in the cache
@@ -69,7 +69,8 @@ class Image:
         return out
 
     def save(self, path: str | PathLike[str], *, srgb: bool = False) -> None:
-        """Write a .png or .ppm, whole or not at all; `srgb` encodes, else the linear values are written. An .exr holds them unclamped.
+        """Write a .png or .ppm, whole or not at all; `srgb` encodes, else the linear values are written. An .exr holds them unclamped. A biased picture
+        says so in the file, in a comment.
 
         Raises ClrtError for any other ending, for an .exr with `srgb` or without its library, OSError with the path in it where it cannot
         be written.
@@ -77,11 +78,12 @@ class Image:
         suffix = check_format(path, srgb)
         check_writable(path)
         pixels = None if suffix == _LINEAR else self.to_uint8(srgb)
+        label = self.stats.bias if self.stats is not None else ""
         with atomic_write(path) as file:
             if pixels is None:
-                exr.write(file, self.pixels)
+                exr.write(file, self.pixels, label)
             else:
-                _WRITERS[suffix](file, pixels, srgb)
+                _WRITERS[suffix](file, pixels, srgb, label)
 
     def _repr_png_(self) -> bytes:
         """What a notebook shows."""

@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 _COMPRESSION = 3
 
 
-def write(file: BinaryIO, pixels: NDArray[np.uint8], srgb: bool) -> None:
-    """Write (height, width, 3) uint8 as 24-bit PNG; `srgb` says so in the file."""
-    file.write(encode(pixels, srgb))
+def write(file: BinaryIO, pixels: NDArray[np.uint8], srgb: bool, comment: str = "") -> None:
+    """Write (height, width, 3) uint8 as 24-bit PNG; `srgb` says so in the file, a `comment` stands in it as text."""
+    file.write(encode(pixels, srgb, comment))
 
 
-def encode(pixels: NDArray[np.uint8], srgb: bool = False) -> bytes:
+def encode(pixels: NDArray[np.uint8], srgb: bool = False, comment: str = "") -> bytes:
     """The bytes of the file. The same pixels give the same bytes: no date, no program name."""
     from PIL import Image as PillowImage
     from PIL.PngImagePlugin import PngInfo
@@ -26,6 +26,8 @@ def encode(pixels: NDArray[np.uint8], srgb: bool = False) -> bytes:
     chunks = PngInfo()
     if srgb:
         chunks.add(b"sRGB", b"\x00")  # rendering intent 0, perceptual
+    if comment:
+        chunks.add_text("Comment", comment)
     buffer = io.BytesIO()
     PillowImage.fromarray(pixels).save(buffer, "PNG", compress_level=_COMPRESSION, pnginfo=chunks)
     return buffer.getvalue()

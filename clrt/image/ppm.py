@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def write(file: BinaryIO, pixels: NDArray[np.uint8], srgb: bool) -> None:
+def write(file: BinaryIO, pixels: NDArray[np.uint8], srgb: bool, comment: str = "") -> None:
     """Write (height, width, 3) uint8. The format cannot say whether the values are encoded, so `srgb` changes nothing here."""
     height, width, _ = pixels.shape
-    file.write(b"P6\n%d %d\n255\n" % (width, height))
+    file.write(b"P6\n%s%d %d\n255\n" % (f"# {comment}\n".encode() if comment else b"", width, height))
     file.write(pixels.tobytes())
