@@ -1,11 +1,12 @@
 // Provides: gloss_lobe: what rough mirrors show of light from a sampled direction; the density of their rays.
 // Needs: gloss_mirror.cl, scatter.cl, added.cl, mis.cl.  Reads: nothing.
 //
-// Rough glass is left to its own rays, which count all that they meet.
+// Rough glass is left to its own rays, which count all that they meet. At the last depth a rough mirror shows nothing, as a polished one does.
 
 // f cos of the lobe, times the share that falls to light samples, drawn with the density `chance`; 0 where the light is not above the surface.
 HOT real_n gloss_lobe(const Geometry *geometry, global const Material *materials, const Rays *rays, const Hit *hit, const real_n *to_light,
                       real_n chance, const int goes_on) {
+    if (!goes_on) return (real_n)0;
     Facets facets;
     mask_n lit = gloss_facets(geometry, materials, rays, hit, &facets);
     const real_n cosine = dot_n(facets.z, to_light);
@@ -16,8 +17,7 @@ HOT real_n gloss_lobe(const Geometry *geometry, global const Material *materials
     gather(mirrored, materials[hit->material[k]].reflect);
     const real_n density = ggx_met(&facets, rays->direction, to_light, &met);
     real_n value = mirrored * ggx_lobe(&facets, density, choose(lit, cosine, (real_n)1), &pdf) / facets.albedo;
-    if (goes_on) value *= mis_share(chance, pdf);
-    return choose(lit, value, (real_n)0);
+    return choose(lit, value * mis_share(chance, pdf), (real_n)0);
 }
 
 //@hook scatter_lobes

@@ -53,7 +53,7 @@ ADDED = Feature("added", _any_of((*_ADDING, _all_of(rough.GLOSS, _any_of(_LIGHT_
 REACH = Feature("reach", _any_of(_REACHING), "reach.cl", helper=True)
 SCATTER = Feature("scatter", _any_of(_LIGHT_DRAWING), "scatter.cl", helper=True)
 FACETS = Feature(
-    "facets", _any_of((rough.GLOSS, rough.METAL_ROUGH)), "ggx.cl", parameters=(("facet_albedos", "global const real *facet_albedos"),), helper=True
+    "facets", _any_of((rough.GLOSS, rough.METAL_ROUGH)), "ggx.cl", early=True, parameters=(("facet_albedos", "global const real *facet_albedos"),), helper=True
 )
 MIS = Feature("mis", _all_of(_any_of(_LIGHT_DRAWING), _any_of(_RAY_DRAWING)), "mis.cl", helper=True)
 GLOSS_LIGHT = Feature("gloss light", _all_of(rough.GLOSS_MIRROR, SCATTER), "gloss_light.cl", helper=True)

@@ -37,6 +37,7 @@ METAL_ROUGH = Feature(
     "metal rough",
     _metal_caller,
     "metal_rough.cl",
+    early=True,
     material=(("metal_rough", np.int32), ("metallic", REAL), ("roughness", REAL)),
     parameters=(("diffuse_shares", "global const real *diffuse_shares"),),
 )
