@@ -65,6 +65,16 @@ def test_picture_matches_reference(lamp: str) -> None:
     assert reference.pixels.std() > 1e-2
 
 
+def test_metal_rough_surface_sees_the_fall_off() -> None:
+    """One lamp with and without: the ratio is the square of the distance."""
+    body = WALL.replace("M 1 1 1  0 1 0 1  0\n", "M 0.8 0.6 0.4 0 1 0 1 0\nmaterial metallic=0.5 roughness=0.5\n")
+    plain = clrt.render(parse_scene(body + "L 1 0 0.5\n"), samples=1).pixels
+    weak = clrt.render(parse_scene(body + "spot 1 0 0.5  0 0 1  360 falloff=yes\n"), samples=1).pixels
+    square = ((_wall_points() - np.array([1.0, 0.0, 0.5])) ** 2).sum(axis=-1, keepdims=True)
+    assert plain.min() > 0.01
+    np.testing.assert_allclose(weak * square, plain, rtol=3e-6)
+
+
 @pytest.mark.parametrize("exponent", [-30, 7, 30])
 def test_picture_does_not_depend_on_the_unit_of_length(exponent: int) -> None:
     scene = parse_scene(BODIES + "spot -1 2 1  0 0 1  360 falloff=yes intensity=5\n")

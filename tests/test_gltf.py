@@ -471,6 +471,54 @@ def test_picture_that_is_missing_or_damaged(tmp_path: Path) -> None:
         load_scene(tmp_path / "a.gltf")
 
 
+def rich() -> Gltf:
+    """A file with something of everything."""
+    made = quad({
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0, 1], "rotation": 1}}},
+                                 "baseColorFactor": [1, 1, 1, 1], "metallicFactor": 0},
+        "normalTexture": {"index": 0, "scale": 2}, "emissiveFactor": [1, 1, 1], "alphaMode": "MASK", "alphaCutoff": 0.25, "name": "m",
+        "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {"ior": 1.5},
+                       "KHR_materials_volume": {"thicknessFactor": 1, "attenuationDistance": 1, "attenuationColor": [1, 1, 1]},
+                       "KHR_materials_emissive_strength": {"emissiveStrength": 2}},
+    }, rotation=[0, 0, 0, 1], scale=[1, 1, 1])  # fmt: skip
+    made.picture(np.zeros((2, 2, 3)), sampler=made.list("samplers", {"wrapS": 10497, "wrapT": 10497, "magFilter": 9728}))
+    made.list("cameras", {"type": "perspective", "perspective": {"yfov": 0.8, "aspectRatio": 1.5}})
+    lights = [{"type": "spot", "intensity": 2, "color": [1, 1, 1], "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.2}}]
+    made.root["extensions"] = {"KHR_lights_punctual": {"lights": lights}}
+    made.node(camera=0, extensions={"KHR_lights_punctual": {"light": 0}}, matrix=np.eye(4).ravel().tolist())
+    made.root["accessors"][0]["sparse"] = {
+        "count": 1, "indices": {"bufferView": made.view(b"\x02"), "componentType": 5121},
+        "values": {"bufferView": made.view(np.ones(3, "<f4").tobytes())},
+    }  # fmt: skip
+    made.root["scene"] = 0
+    return made
+
+
+def places(value: Any) -> list[tuple[Any, Any]]:
+    """Each container of a JSON value and each key in it."""
+    pairs = list(value.items()) if isinstance(value, dict) else list(enumerate(value)) if isinstance(value, list) else []
+    return [(value, key) for key, _ in pairs] + [place for _, inner in pairs for place in places(inner)]
+
+
+def test_any_wrong_value_anywhere_is_a_fault_or_harmless(tmp_path: Path) -> None:
+    whole = rich()
+    assert loaded(tmp_path, whole).objects
+    refused = 0
+    values = [None, -1, 10**15, 0.5, "x", [], {}, True, [0, 0, 0]]
+    for number in range(len(places(whole.root))):
+        for wrong in (values[number % 9], values[(number * 5 + 4) % 9]):
+            root = json.loads(json.dumps(whole.root))
+            container, key = places(root)[number]
+            container[key] = wrong
+            (tmp_path / "wrong.glb").write_bytes(glb(json.dumps(root).encode(), whole.data))
+            try:
+                load_scene(tmp_path / "wrong.glb")
+            except SceneError as problem:
+                assert "wrong.glb: error: " in str(problem)
+                refused += 1
+    assert refused > 100
+
+
 def test_options_for_scene_texts_are_refused(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="--right-handed is for scene texts"):
         loaded(tmp_path, triangle(), right_handed=True)

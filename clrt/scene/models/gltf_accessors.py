@@ -12,6 +12,7 @@ from clrt.scene.models.gltf_json import Item, check_place
 
 _COMPONENTS: dict[int, np.dtype[Any]] = {5120: np.dtype("i1"), 5121: np.dtype("u1"), 5122: np.dtype("<i2"), 5123: np.dtype("<u2"),
                                          5125: np.dtype("<u4"), 5126: np.dtype("<f4")}  # fmt: skip
+_MOST_ZEROS = 1 << 24  #: elements of an accessor without data, of which there may be any number at no cost to the file
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
@@ -50,9 +51,12 @@ def _read(document: Document, index: int, width: int, path: str) -> tuple[Item, 
         raise item.fault(f"({path}) expected the type {wanted}, found {item.text('type', 'none')}")
     kind = _component(item)
     count = item.count("count")
-    values = np.zeros((count, width), kind)
     if item.has("bufferView"):
         values = _strided(document, item, "bufferView", item.count("byteOffset"), kind, count, width)
+    elif count <= _MOST_ZEROS:
+        values = np.zeros((count, width), kind)
+    else:
+        raise item.fault(f"has {count} elements and no bufferView; export the file again")
     if item.has("sparse"):
         values = _overwrite(document, values.copy(), item.item("sparse"))
     return item, values
