@@ -138,6 +138,25 @@ def test_mesh_of_several_nodes_is_kept_once(tmp_path: Path) -> None:
         np.testing.assert_allclose(placed, inner[[0, 2, 1]] * MIRROR, atol=1e-14)
 
 
+def test_shared_mesh_looks_like_copies_of_it(tmp_path: Path) -> None:
+    pictures = []
+    for shared in (True, False):
+        made = Gltf()
+        made.root["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": 3}]}}
+        for x in range(3):
+            mesh = 0 if shared and x else made.mesh(QUAD, QUAD_ORDER)
+            turn = 0.3 * x
+            made.node(mesh=mesh, translation=[2 * x - 2, 0, -x], rotation=[0, math.sin(turn), 0, math.cos(turn)], scale=[1, 1 + x, 1])
+        made.node(extensions={"KHR_lights_punctual": {"light": 0}}, rotation=[0.2, 0.3, 0, 0.9])
+        made.list("cameras", {"type": "perspective", "perspective": {"yfov": 0.9}})
+        made.node(camera=0, translation=[0, 0, 8])
+        scene = loaded(tmp_path, made)
+        assert len(scene.instances) == (3 if shared else 0)
+        pictures.append(clrt.render(scene, size=(40, 30), samples=1).pixels)
+    assert pictures[0].std() > 0.01
+    assert (np.abs(pictures[0] - pictures[1]).max(axis=2) > 1e-5).mean() < 0.01, "but for pixels on an edge"
+
+
 def test_primitives_of_a_mesh_are_one_object_with_its_materials(tmp_path: Path) -> None:
     made = Gltf()
     for _ in range(2):

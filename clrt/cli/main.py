@@ -17,7 +17,7 @@ from clrt.cli.paths import DEFAULT_SCENE
 #: a command and the module that has it, in the order of the help; imported when called for, so that `clrt --help` is quick
 _COMMANDS = {"render": "render", "explain": "explain", "devices": "devices", "verify": "verify", "convert": "scenes", "make": "scenes"}
 
-_HELP = """Render a scene text to a picture.
+_HELP = """Render a scene text or a glTF model to a picture.
 
     \b
     clrt scene.txt                     writes scene.png into the current folder
