@@ -31,17 +31,13 @@
     }
 //@end
 //@hook accept_sure
-    real_n along = t - error;
-    //@ after_sure
-    hit &= is_less(rays->after, NO_LANES) | is_greater(along, rays->after_t);
+    hit &= is_less(rays->after, NO_LANES) | is_greater(t - error, rays->after_t);
 //@end
 //@hook exact_accept
         lane_int last[LANES];
         store_lanes(rays->after, last);
         if (hit && last[k] >= 0) {
-            int order;
-            //@ after_exact
-            order = exact_nearer(geometry, origin, direction, slot, &plane, last[k], &stage);
+            const int order = exact_nearer(geometry, origin, direction, slot, &plane, last[k], &stage);
             hit = order > 0 || (order == 0 && geometry->surfaces[slot].prim > geometry->surfaces[last[k]].prim);
         }
 //@end

@@ -28,17 +28,6 @@
             if (last[k] >= 0 && there[k] != rays->place_here) later[k] = rays->place_here > there[k] ? -1 : 0;
         along = t / rays->after_scale;
 //@end
-//@hook after_sure
-    along /= rays->after_scale;
-//@end
-//@hook after_exact
-            lane_int there[LANES];
-            real after_t[LANES];
-            store_lanes(rays->after_place, there);
-            store_lanes(rays->after_t * rays->after_scale, after_t);
-            if (there[k] != rays->place_here) order = exact_after(geometry, origin, direction, slot, &plane, after_t[k], &stage);
-            else
-//@end
 //@hook opacity_after
         rays.after_place = choose(blocked, hits.place, rays.after_place);
 //@end
