@@ -202,7 +202,8 @@ def private_bytes(precision: Precision, lanes: int, shape: Shape, features: Feat
     names = {f.name for f in features.active}
     entry = lane_bytes * (9 + (2 * MEDIA_DEPTH + 1 if "refraction" in names else 0) + (3 if "absorption" in names else 0)) + 64
     # Refraction: for coincident walls.
-    copies = 1 + sum(name in names for name in ("bounce", "shadows", "sun shadows", "opacity shadows", "refraction"))
+    tracing = ("bounce", "shadows", "sun shadows", "area shadows", "environment shadows", "opacity shadows", "refraction")
+    copies = 1 + sum(name in names for name in tracing)
     traversal = shape.stack * (2 * lane_bytes + 4) * copies
     if "object tree" in names:
         traversal += shape.tree * (lane_bytes + 4) * copies + ("placed" in names) * shape.stack * (2 * lane_bytes + 4) * copies
