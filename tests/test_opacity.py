@@ -1,4 +1,4 @@
-"""Opacity and cut-outs: what a scene text may say of them, pictures and shadows against closed forms and the reference, the rays they cost."""
+"""Opacity and cut-outs: what a scene text may say of them; pictures and shadows against closed forms and the reference; their rays."""
 
 from __future__ import annotations
 
@@ -61,11 +61,16 @@ def _compare(scene: Scene, pixels: np.ndarray) -> None:
 @pytest.mark.parametrize(
     "look",
     [
-        "opacity 0.4\n" + PLAIN, "opacity 0.7 of=shadow\n" + PLAIN, "opacity 0\n" + PLAIN, "texture rough.png alpha=yes filter=nearest\n" + THINGS,
-        "texture soft.png alpha=yes\n" + THINGS, "opacity 0.8\ntexture rough.png alpha=yes cutoff=0.4 filter=nearest wrap=mirror\n" + THINGS,
-        "texture soft.png alpha=yes cutoff=0.47 wrap=clamp\n" + THINGS, "opacity 0.6\n" + CURVED + CURVED.replace("2.6", "4"),
+        "opacity 0.4\n" + PLAIN,
+        "opacity 0.7 of=shadow\n" + PLAIN,
+        "opacity 0\n" + PLAIN,
+        "texture rough.png alpha=yes filter=nearest\n" + THINGS,
+        "texture soft.png alpha=yes\n" + THINGS,
+        "opacity 0.8\ntexture rough.png alpha=yes cutoff=0.4 filter=nearest wrap=mirror\n" + THINGS,
+        "texture soft.png alpha=yes cutoff=0.47 wrap=clamp\n" + THINGS,
+        "opacity 0.6\n" + CURVED + CURVED.replace("2.6", "4"),
     ],
-)  # fmt: skip
+)
 def test_picture_matches_reference(write: Write, look: str) -> None:
     scene = write(HEAD + LIGHTS + MATERIAL + look + FLOOR)
     _compare(scene, clrt.render(scene).pixels)

@@ -58,7 +58,7 @@ def _steepness(texture: Texture, rate: FloatArray) -> FloatArray:
 
 
 def _frames(prims: Primitives, surface: Surface, rows: IndexArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Unit x (k, 3), perpendicular to the normal, along u; y (k, 3), perpendicular to both, along v; and whether there is such a frame (k,)."""
+    """Unit x (k, 3), perpendicular to the normal, along u; y (k, 3), perpendicular to both, along v; whether there is such a frame (k,)."""
     x, y, framed = np.zeros((len(rows), 3)), np.zeros((len(rows), 3)), np.zeros(len(rows), np.bool_)
     mesh = surface.prim[rows] < prims.triangle_count
     x[mesh], y[mesh], framed[mesh] = _on_triangles(prims, surface.prim[rows[mesh]], surface.n_shade[rows[mesh]])

@@ -18,13 +18,15 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
+MOST_ON_A_WAY = 1024  #: triangles before a light, beyond which it is hidden
+
 
 @dataclass(frozen=True, eq=False)
 class SceneCover:
     """What the primitives of a scene keep of light that would go straight on.
 
-    factor : (materials,) opacity; seen : (materials,) bool, whether it holds for what is seen; picture : (materials,) whose alpha multiplies it,
-    -1 for none; cutoff : (materials,)
+    factor : (materials,) opacity; seen : (materials,) bool, whether it holds for what is seen
+    picture : (materials,) the texture whose alpha multiplies it, -1 for none; cutoff : (materials,)
     """
 
     scene: Scene
@@ -46,7 +48,7 @@ class SceneCover:
         return bool((self.factor == 1.0).all() and (self.picture < 0).all())
 
     def kept(self, prims: Primitives, prim: IndexArray, point: FloatArray, pos_err: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Opacity of primitives at points (m, 3) on them, (m,), and its margin (m,); pos_err (m,) is the points' error along the surface."""
+        """Opacity of primitives at points (m, 3) on them, (m,), and its margin (m,). pos_err : (m,) the points' error along it."""
         material = prims.material[prim]
         kept, margin = self.factor[material].copy(), np.full(len(prim), np.inf)
         for index in np.unique(self.picture[material][self.picture[material] >= 0]).tolist():
@@ -76,6 +78,7 @@ class SceneCover:
                                  _errors(prims, segments, ray, prim, t))  # fmt: skip
         left, margin, opaque = np.ones(len(segments.own)), nearest, np.zeros(len(segments.own))
         np.multiply.at(left, ray, 1.0 - kept)
+        left[np.bincount(ray[prim < prims.triangle_count], minlength=len(left)) > MOST_ON_A_WAY] = 0.0
         firm = np.minimum(firm, texels)
         np.minimum.at(margin, ray, firm)
         # One firm opaque blocker is enough, whatever else there is.
@@ -83,7 +86,7 @@ class SceneCover:
         return left, np.maximum(margin, opaque)
 
     def through_plane(self, prims: Primitives, segments: Rays, rows: IndexArray) -> tuple[FloatArray, FloatArray]:
-        """What the triangles on which the segments `rows` (k,) start let through where the segments meet their planes, (k,), and its margin."""
+        """What the triangles on which the segments `rows` (k,) start let through where these meet their planes, (k,), and its margin."""
         prim, origin, direction = segments.own[rows], segments.origin[rows], segments.direction[rows]
         n = prims.n_geo[prim]
         t = dot(prims.vertices[prim, 0] - origin, n) / dot(direction, n)
