@@ -37,10 +37,12 @@ HOT void placed_trace(const Geometry *geometry, const int place, const Rays *ray
     }
     inner.skip = choose(is_equal(rays->skip_place, (mask_n)number), rays->skip, (mask_n)-1);
     found.slot = (mask_n)-1;
+    //@ placed_before
     placed_leaf(&seen, b, &inner, active & inner.active, any_hit, &found);
     const mask_n hit = is_at_least(found.slot, NO_LANES);
     found.t = choose(hit, found.t / length, hits->t);
     found.slot = choose(hit, found.slot, hits->slot);
+    //@ placed_after
     found.place = choose(hit, (mask_n)number, hits->place);
     *hits = found;
 }
@@ -96,6 +98,12 @@ HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit
 //@hook tree_order
             if (here[k] != there[k]) order = here[k] - there[k];
 //@end
+//@hook tree_other
+            other |= is_at_least(hits->place, NO_LANES);
+//@end
+//@hook tree_direct
+    hits->place = choose(is_at_least(hits->slot, NO_LANES), (mask_n)-1, hits->place);
+//@end
 //@hook tree_found
         found.place = (mask_n)-1;
 //@end
@@ -134,6 +142,12 @@ HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit
 //@end
 //@hook reach_start
     towards.skip_place = load_lanes(hit->place);
+//@end
+//@hook planar
+    planar &= is_less(load_lanes(hit->place), NO_LANES);  // the plane of a placement is not where its vertices are
+//@end
+//@hook refine_lane
+        if (hit->place[k] >= 0) continue;  // nor is its point; the one there is and its error hold
 //@end
 //@hook media_own
         if (hit->place[k] >= 0) own[k] = hit->medium[k];

@@ -19,6 +19,7 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
     }
     for (int k = 0; k < LANES; k++) {
         if (!lane[k] || hit->slot[k] >= geometry->slot_count) continue;
+        //@ refine_lane
         double origin[3], direction[3], e1[3], e2[3], normal[3], at[3], cross[3], sum = 0, size = 0;
         for (int a = 0; a < 3; a++) {
             origin[a] = shared_origin ? geometry->shared_origin[a] : geometry->local_origin[a] + (double)from[a][k];
@@ -74,6 +75,7 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
     // from behind the plane: there the triangle itself may stand between, and the end must be on the viewer's side.
     mask_n planar = is_less(load_lanes(hit->slot), (mask_n)geometry->slot_count) & is_less(dot_n(hit->geometric, span), (real_n)0);
     for (int a = 0; a < 3; a++) planar &= is_equal(end[a], hit->point[a]);
+    //@ planar
     above = choose(planar, (real_n)0, above);
 //@end
 //@hook shadow_limit
