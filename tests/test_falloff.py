@@ -54,8 +54,11 @@ def test_whole_turn_without_softness_is_a_point_light() -> None:
     assert np.array_equal(turned, clrt.render(parse_scene(BODIES + "L 1 4 -1\n")).pixels)
 
 
-@pytest.mark.parametrize("lamp", ["spot -2 3 1  2 -3.2 1.7  50 softness=0.6 falloff=yes intensity=20\n",
-                                  "spot -1 2 1  0 0 1  360 falloff=yes intensity=5\nL 5 5 -5 0.2 0.2 0.2\nsun 1 3 -1 intensity=0.2\n"])  # fmt: skip
+ONE = "spot -2 3 1  2 -3.2 1.7  50 softness=0.6 falloff=yes intensity=20\n"
+SEVERAL = "spot -1 2 1  0 0 1  360 falloff=yes intensity=5\nL 5 5 -5 0.2 0.2 0.2\nsun 1 3 -1 intensity=0.2\n"
+
+
+@pytest.mark.parametrize("lamp", [ONE, SEVERAL])
 def test_picture_matches_reference(lamp: str) -> None:
     scene = parse_scene(BODIES + lamp)
     pixels, reference = clrt.render(scene).pixels, render(scene)

@@ -493,7 +493,7 @@ def test_picture_that_is_missing_or_damaged(tmp_path: Path) -> None:
 def rich() -> Gltf:
     """A file with something of everything."""
     made = quad({
-        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0, 1], "rotation": 1}}},
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "extensions": {"KHR_texture_transform": {"rotation": 1}}},
                                  "baseColorFactor": [1, 1, 1, 1], "metallicFactor": 0},
         "normalTexture": {"index": 0, "scale": 2}, "emissiveFactor": [1, 1, 1], "alphaMode": "MASK", "alphaCutoff": 0.25, "name": "m",
         "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1}, "KHR_materials_ior": {"ior": 1.5},
@@ -519,6 +519,15 @@ def places(value: Any) -> list[tuple[Any, Any]]:
     return [(value, key) for key, _ in pairs] + [place for _, inner in pairs for place in places(inner)]
 
 
+def refusal_of(path: Path) -> str | None:
+    """The message of the error with which a file is refused; None if it is not."""
+    try:
+        load_scene(path)
+    except SceneError as problem:
+        return str(problem)
+    return None
+
+
 def test_any_wrong_value_anywhere_is_a_fault_or_harmless(tmp_path: Path) -> None:
     whole = rich()
     assert loaded(tmp_path, whole).objects
@@ -530,11 +539,9 @@ def test_any_wrong_value_anywhere_is_a_fault_or_harmless(tmp_path: Path) -> None
             container, key = places(root)[number]
             container[key] = wrong
             (tmp_path / "wrong.glb").write_bytes(glb(json.dumps(root).encode(), whole.data))
-            try:
-                load_scene(tmp_path / "wrong.glb")
-            except SceneError as problem:
-                assert "wrong.glb: error: " in str(problem)
-                refused += 1
+            refusal = refusal_of(tmp_path / "wrong.glb")
+            assert refusal is None or "wrong.glb: error: " in refusal
+            refused += refusal is not None
     assert refused > 100
 
 

@@ -59,8 +59,8 @@ def test_pictures_of_an_included_text_are_found_beside_it(tmp_path: Path) -> Non
 
 
 def test_fault_has_the_place_in_its_file(tmp_path: Path) -> None:
+    body = "M 1 1 1 0.1 0.9 0.3 20 0\ninclude b.txt\nS 0 0 x 1\n"
     with pytest.raises(SceneError) as caught:
-        body = "M 1 1 1 0.1 0.9 0.3 20 0\ninclude b.txt\nS 0 0 x 1\n"
         scene(tmp_path, main="# scene\n" + CAMERA + "include parts/a.txt\nL 1 2\n", parts__a=body, parts__b="\n  V 0 0 1\n")
     assert str(caught.value).replace(str(tmp_path), "").splitlines() == [
         "/parts/b.txt:2:3: error: a second V line; the first is line 3, remove one of the two",

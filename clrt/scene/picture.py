@@ -54,7 +54,7 @@ def _nearby(path: Path) -> str:
 
 
 def read_picture(path: Path | IO[bytes], name: str) -> Picture:
-    """The picture of a file, or of its bytes. Raises PictureError for what is no picture, is cut off, has no size or more than one frame."""
+    """The picture of a file, or of its bytes. Raises PictureError for no picture, one cut off, without a size, of more than one frame."""
     from PIL import Image, UnidentifiedImageError
 
     try:

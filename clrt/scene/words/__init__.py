@@ -14,7 +14,10 @@ from clrt.scene.words.word import Choice, Draft, Text, Word, WordCall
 
 __all__ = ["WORDS", "Choice", "Draft", "Text", "Word", "WordCall", "read_word"]
 
-WORDS: dict[str, Word] = {**frame.WORDS, **eye.WORDS, **lamps.WORDS, **pictures.WORDS, **glass.WORDS, **instances.WORDS, **meshes.WORDS, **rough.WORDS, **shining.WORDS, **surface.WORDS, **surroundings.WORDS}
+WORDS: dict[str, Word] = {
+    **frame.WORDS, **eye.WORDS, **lamps.WORDS, **pictures.WORDS, **glass.WORDS, **instances.WORDS,
+    **meshes.WORDS, **rough.WORDS, **shining.WORDS, **surface.WORDS, **surroundings.WORDS,
+}  # fmt: skip
 
 
 def read_word(tokens: Sequence[Token], line: int, faults: Faults) -> WordCall | None:
