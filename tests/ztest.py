@@ -20,6 +20,7 @@ from clrt.scene.model import Scene
 FloatArray = NDArray[np.float64]
 
 LEVEL = 0.01
+ROUNDING = 4e-6  #: relative, of kernels' numbers
 BLOCK = 4  #: pixels along the side of a block
 MOST_FREEDOM = 400  #: degrees of freedom from which on Student's t is taken as that of this many: tails a little wide
 
@@ -32,20 +33,25 @@ class Verdict:
     worst: str
 
 
-def device_batches(scene: Scene, samples: int, seeds: range) -> FloatArray:
+def device_batches(scene: Scene, samples: int, seeds: range, precision: str = "watertight") -> FloatArray:
     """(k, h, w, 3) float64: the scene rendered once a seed, each the mean of `samples`."""
-    return np.stack([np.asarray(clrt.render(replace(scene, samples=samples), seed=seed).pixels, np.float64) for seed in seeds])
+    sampled = replace(scene, samples=samples)
+    return np.stack([np.asarray(clrt.render(sampled, seed=seed, precision=precision).pixels, np.float64) for seed in seeds])
 
 
-def compare(batches: FloatArray, mean: FloatArray, variance_of_mean: FloatArray, level: float = LEVEL, rounding: float = 4e-6) -> Verdict:
+def compare(
+    batches: FloatArray, mean: FloatArray, variance_of_mean: FloatArray, level: float = LEVEL, rounding: float = ROUNDING, pixels: bool = True
+) -> Verdict:
     """Welch's t-test of the batches' mean against `mean`, at all scales.
 
     batches : (k, h, w, 3), k >= 2, independent; mean, variance_of_mean : (h, w, 3) of independent pixels
     rounding : of the batches' numbers, relative; it counts as a standard deviation, so that equal numbers without variance are equal
+    pixels : look at single pixels, too; their means are not normal where much of what they get comes in few of their samples
     """
     findings: list[tuple[float, str]] = []
     height, width = mean.shape[:2]
-    for name, rows, columns in (("pixel", 1, 1), ("block", BLOCK, BLOCK), ("picture", height, width)):
+    scales = (("pixel", 1, 1), ("block", BLOCK, BLOCK), ("picture", height, width))
+    for name, rows, columns in scales[0 if pixels else 1 :]:
         few, one = _blocks(batches, rows, columns), _blocks(mean[None], rows, columns)[0]
         spread = _blocks(variance_of_mean[None], rows, columns)[0] / _sizes(height, width, rows, columns)
         p, t = welch(few, one, spread, rounding)
@@ -58,9 +64,11 @@ def compare(batches: FloatArray, mean: FloatArray, variance_of_mean: FloatArray,
     return Verdict(least >= 1.0, text)
 
 
-def assert_same(batches: FloatArray, mean: FloatArray, variance_of_mean: FloatArray, level: float = LEVEL) -> None:
-    """Fail, and say where, if the two pictures differ by more than chance."""
-    verdict = compare(batches, mean, variance_of_mean, level)
+def assert_same(
+    batches: FloatArray, mean: FloatArray, variance_of_mean: FloatArray, rounding: float = ROUNDING, pixels: bool = True
+) -> None:
+    """Fail, and say where, if the two pictures differ by more than chance and `rounding`. See `compare`."""
+    verdict = compare(batches, mean, variance_of_mean, rounding=rounding, pixels=pixels)
     assert verdict.accepted, verdict.worst
 
 
