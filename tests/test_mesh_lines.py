@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -234,6 +235,14 @@ def test_command_refuses_with_code_2_and_writes_nothing(tmp_path: Path, name: st
     assert "error:" in result.stderr
     assert "Traceback" not in result.stderr
     assert not list(tmp_path.glob("*.png"))
+
+
+def test_without_trimesh_the_error_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """glTF needs nothing."""
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    assert len(scene(tmp_path, RED + "mesh a.glb\n", a_glb=glb()).objects) == 1
+    with pytest.raises(SceneError, match=r"7:6: error: a\.obj: reading mesh files needs trimesh; install it: pip install 'clrt\[mesh\]'"):
+        scene(tmp_path, RED + "mesh a.obj\n", a_obj=OBJ)
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the meshes are not here")
