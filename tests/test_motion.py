@@ -37,7 +37,15 @@ GLASS = FRAME + (
     "move 0.4 0.2 0.3\nO\n" + ROOM
 )
 EYE = SMOOTH + "move 0.3 -0.1 0.2 of=eye\nlens 0.05 3\n"
-SCENES = {"flat": FLAT, "smooth": SMOOTH, "glass": GLASS, "eye": EYE, "eye alone": FRAME + ROOM + "move 0.3 -0.1 0.2 of=eye\n"}
+INSTANCE = FLAT.replace("move 0.5", "object flyer hidden=yes\nmove 0.5") + "instance flyer 0.2 0.1 0 turn_z=40 scale=0.8 scale_x=1.5\n"
+SCENES = {
+    "instance": INSTANCE,
+    "flat": FLAT,
+    "smooth": SMOOTH,
+    "glass": GLASS,
+    "eye": EYE,
+    "eye alone": FRAME + ROOM + "move 0.3 -0.1 0.2 of=eye\n",
+}
 #: of the angle to an edge: on the rung `watertight` rays of any origin see edges up to 64u times their reach wide (docs/numerics.md); the
 #: reach of these scenes is below 30, a few units off: 64 * 2^-24 * 30 / 2
 MARGIN = {"watertight": 6e-5}
