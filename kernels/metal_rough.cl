@@ -79,7 +79,7 @@ HOT real_n metal_straight(const MetalRough *metal, real_n color) {
 //@hook light_lobes
         real_n matte, lobe, grazing, unused;
         metal_lobes(shade->metal, rays, hit, to_light, lit, &matte, &lobe, &grazing, &unused);
-        const real_n metal_power = choose(shade->metal->here, amount * R(3.14159265358979324), (real_n)0);
+        real_n metal_power = choose(shade->metal->here, amount * R(3.14159265358979324), (real_n)0);
         amount = choose(shade->metal->here, (real_n)0, amount);
         wanted = (wanted & ~shade->metal->here) | is_greater(metal_power * (matte + lobe) * weight, (real_n)0);
         lit |= shade->metal->here;

@@ -142,6 +142,34 @@ def test_more_surfaces_than_a_ray_follows_let_nothing_through() -> None:
     assert _pixel(BELOW + "opacity 1e-4\n" + panes) == 0.0
 
 
+CEILING = "T -90 9 -90 90 9 -90 0 9 90\n"
+PANE = "T -90 2 -90 90 2 -90 0 2 90\n"
+
+
+@pytest.mark.parametrize(
+    ("light", "metal"),
+    [("L 0 4 0\n", "material roughness=0.4\n"), ("sun 0 1 -0.5\n", "material metallic=1 roughness=0.5\n"), ("sun 0 1 -0.5\n", "")],
+)
+def test_pane_before_everything_dims_all_lights_alike(light: str, metal: str) -> None:
+    """The same random numbers are drawn with it and without, so the pictures are in proportion."""
+    text = BELOW.replace("L 0 4 0\n", light).replace("M 1 1 1 0 1 0 1 0\n", "M 1 1 1 0 1 0.3 5 0\n" + metal)
+    clear, dim = (_pixel(text + "opacity 0.3\n" + things) for things in ("S 0 -9 0 1\n", PANE))
+    assert clear > 0.1
+    assert abs(dim - 0.7 * clear) < 1e-6 * clear
+
+
+@pytest.mark.parametrize("metal", ["", "material roughness=0.4\n"])
+def test_pane_dims_area_lights_and_environments(write: Write, metal: str) -> None:
+    text = BELOW.replace("L 0 4 0\n", "").replace("M 1 1 1 0 1 0 1 0\n", "M 1 1 1 0 1 0.3 5 0\n" + metal)
+    lamp = "M 0 0 0 0 0 0 1 0\narealight 2 3 4\n" + CEILING
+    for scene in (text + lamp, text + "environment soft.png\n"):
+        shaded = scene + "M 1 1 1 0 0 0 1 0\nopacity 0.3\n"
+        shell = PANE if "arealight" in scene else "S 0 1 -3 40\n"
+        clear, dim = (clrt.render(write(shaded + things)).pixels[0, 0] for things in ("S 0 -9 0 1\n", shell))
+        assert clear.min() > 0.05
+        assert dim == pytest.approx(0.7 * clear, rel=1e-5)
+
+
 def test_rays_of_the_straight_way_count_towards_the_depth() -> None:
     panes = "".join(f"T -9 -9 {z} 9 -9 {z} 0 9 {z}\n" for z in (2, 3, 4))
     text = "E 0 0 0\nV 0 0 1\nF 45\nR 1 1\nbackground 1 1 1\nM 1 1 1 0 0 0 1 0\nopacity 0.5\n" + panes

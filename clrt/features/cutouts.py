@@ -31,6 +31,11 @@ def _map_caller(attribute: str) -> Caller:
     return called_by
 
 
+def _metal_map_caller(scene: Scene) -> int | None:
+    numbers = (m.metal_rough_map for m in used_materials(scene) if m.metal_rough)
+    return min((scene.textures[i].line for i in numbers if i >= 0), default=None)
+
+
 def _round_picture_caller(scene: Scene) -> int | None:
     """A picture on a round primitive."""
     used = [scene.materials[i] for i in np.unique(scene.spheres.material_ids).tolist()]
@@ -67,9 +72,10 @@ NORMAL_MAP = Feature(
 )
 NORMAL_GLOBE = Feature("round normal map", Joint((NORMAL_MAP, shapes.SPHERES), every=True), "normalmap_globe.cl", helper=True)
 NORMAL_PLACED = Feature("placed normal map", Joint((NORMAL_MAP, placed.PLACED), every=True), "normalmap_placed.cl", helper=True)
+_METAL_MAPS = Feature("metal maps", _metal_map_caller, "texture.cl")  #: what calls for pictures besides effects above
 PICTURES = Feature(
     "pictures",
-    Joint((surfaces.TEXTURES, ALPHA, NORMAL_MAP)),
+    Joint((surfaces.TEXTURES, ALPHA, NORMAL_MAP, _METAL_MAPS)),
     "texture.cl",
     parameters=(
         ("textures", "global const Texture *textures"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from clrt.features import cutouts, surfaces
-from clrt.features.feature import REAL, Feature, used_materials
+from clrt.features.feature import REAL, Feature, Joint, used_materials
 from clrt.scene.model import Scene
 
 
@@ -40,6 +40,9 @@ METAL_ROUGH = Feature(
     early=True,
     material=(("metal_rough", np.int32), ("metallic", REAL), ("roughness", REAL)),
     parameters=(("diffuse_shares", "global const real *diffuse_shares"),),
+)
+METAL_OPACITY = Feature(
+    "metal opacity", Joint((METAL_ROUGH, cutouts.OPACITY_SHADOWS), every=True), "metal_opacity.cl", early=True, helper=True
 )
 METAL_MAP = Feature(
     "metal map",
