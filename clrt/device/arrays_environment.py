@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from clrt.device import layout
 from clrt.device.packed import Packed
 from clrt.scene.model import Environment
-from clrt.scene.skylight import WORDS, beginnings, cosines, lit_count, row_words, texel_words
+from clrt.scene.skylight import WORDS, beginnings, cosines, lit_count, luminance, row_words, texel_words
 
 
 def cells(packed: Packed) -> NDArray[Any]:
@@ -28,7 +28,7 @@ def rows(packed: Packed) -> NDArray[np.void]:
     solid_angle = 2.0 * np.pi * (edges[:-1] - edges[1:]) / width
     records["density"] = words / WORDS / WORDS / solid_angle
     records["begin"] = beginnings(words).view(np.int32)
-    records["lit"] = lit_count(texel_words(environment))
+    records["lit"] = lit_count(luminance(environment))
     return records
 
 

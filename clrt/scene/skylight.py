@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from clrt.scene.model import Environment, FloatArray
 
 WORDS = 1 << 32
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  #: of linear red, green, blue (ITU-R BT.709)
+_LUMINANCE = (0.2126, 0.7152, 0.0722)  #: of linear red, green, blue (ITU-R BT.709)
 
 
 def cosines(height: int) -> FloatArray:
@@ -22,33 +22,41 @@ def cosines(height: int) -> FloatArray:
     return np.asarray(edges)
 
 
+def luminance(environment: Environment) -> FloatArray:
+    """(h, w) of each texel."""
+    red, green, blue = np.moveaxis(environment.radiance, -1, 0)
+    return np.asarray(_LUMINANCE[0] * red + _LUMINANCE[1] * green + _LUMINANCE[2] * blue)
+
+
 def row_words(environment: Environment) -> NDArray[np.int64]:
     """(h,) words of each row, in proportion to its luminance times solid angle."""
     edges = cosines(len(environment.radiance))
-    return _whole(((environment.radiance @ _LUMINANCE).sum(axis=1) * (edges[:-1] - edges[1:]))[None])[0]
+    return np.asarray(_whole((luminance(environment).sum(axis=1) * (edges[:-1] - edges[1:]))[None])[0])
 
 
 def texel_words(environment: Environment) -> NDArray[np.int64]:
     """(h, w) words of each texel of a row, in proportion to its luminance; a row that does not shine has none."""
-    return _whole(environment.radiance @ _LUMINANCE)
+    return _whole(luminance(environment))
 
 
-def lit_count(words: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(...) of words (..., n): how many there are from the first to the last that is drawn at all."""
-    return np.where(words.any(axis=-1), words.shape[-1] - (words[..., ::-1] > 0).argmax(axis=-1), 0)
+def lit_count(weights: NDArray[np.int64] | FloatArray) -> NDArray[np.int64]:
+    """(...) of weights (..., n): how many there are from the first to the last that is drawn at all."""
+    drawn = weights > 0
+    return np.where(drawn.any(axis=-1), drawn.shape[-1] - drawn[..., ::-1].argmax(axis=-1), 0)
 
 
 def beginnings(words: NDArray[np.int64]) -> NDArray[np.uint32]:
     """(..., n) the word at which each begins; what stands behind the last that is drawn is never looked at."""
-    return np.minimum(np.cumsum(words, axis=-1) - words, WORDS - 1).astype(np.uint32)
+    return np.asarray(np.minimum(np.cumsum(words, axis=-1) - words, WORDS - 1), np.uint32)
 
 
 def _whole(weights: FloatArray) -> NDArray[np.int64]:
     """Whole numbers (m, n) whose rows add up to 2^32, in proportion to `weights` (m, n): none for 0, else at least one. n <= 2^16."""
+    most = weights.max(axis=1, keepdims=True)
+    weights = np.divide(weights, most, where=most > 0.0, out=np.zeros_like(weights))  # by the greatest first: no sum over- or underflows
     total = weights.sum(axis=1, keepdims=True)
-    parts = np.divide(weights, total, where=total > 0.0, out=np.zeros_like(weights))
-    words = np.floor(parts * WORDS).astype(np.int64)
-    words[(weights > 0.0) & (words == 0)] = 1
+    words = np.asarray(weights * (WORDS / np.maximum(total, 1.0)), np.int64)
+    words += (weights > 0.0) & (words == 0)
     # What rounding left over, at most one a weight, goes to the greatest, which has at least 2^16 - 1.
     left = np.where(total[:, 0] > 0.0, WORDS - words.sum(axis=1), 0)
     words[np.arange(len(words)), weights.argmax(axis=1)] += left
