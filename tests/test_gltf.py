@@ -17,6 +17,7 @@ import clrt
 from clrt.errors import SceneError
 from clrt.scene.build import load_scene
 from clrt.scene.model import Material, Scene
+from clrt.scene.models import direct
 from clrt.scene.models.gltf_nodes import rotation
 from tests.gltf_files import QUAD, QUAD_ORDER, QUAD_UV, TRIANGLE, Gltf, glb, quad, triangle
 
@@ -243,6 +244,18 @@ def test_file_without_camera_is_framed(tmp_path: Path) -> None:
     across, up = 2 * (seen @ right) / (right @ right), 2 * (seen @ down) / (down @ down)
     assert max(np.abs(across).max(), np.abs(up).max()) == pytest.approx(0.85, abs=1e-5)
     assert any("no camera in the file" in warning for warning in scene.warnings)
+
+
+def test_many_instances_are_framed_by_their_boxes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Corners of boxes reach as far as points that fill them, and no farther."""
+    made = Gltf()
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 2)], float)
+    made.mesh(corners, [0, 3, 6, 1, 2, 5, 4, 7, 0, 5, 3, 6])
+    for x in range(4):
+        made.node(mesh=0, translation=[2 * x, x, 0])
+    exact = loaded(tmp_path, made).camera
+    monkeypatch.setattr(direct, "_MOST_POINTS", 10)
+    np.testing.assert_allclose(loaded(tmp_path, made).camera.eye, exact.eye, atol=1e-12)
 
 
 # Lights

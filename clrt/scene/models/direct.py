@@ -24,6 +24,7 @@ _SAMPLES = 64  #: rays through a pixel: metal-rough surfaces, emission and the s
 _ASPECT = 4.0 / 3.0  #: of a picture whose file says none
 _FOV = 45.0  #: degrees from left to right, where there is no camera
 _FILL = 0.85  #: of the picture that the model then spans
+_MOST_POINTS = 1 << 22  #: of instances, that the view is fitted to one by one
 _VIEW = (-0.45, -0.35, 1.0)  #: from the front, the right and a little above
 
 
@@ -118,9 +119,7 @@ def framed(objects: Sequence[MeshObject], instances: Sequence[Instance] = ()) ->
     With the eye at distance D from the middle of the box, along the view, a vertex that lies (x, y, z) from there as the eye sees it is
     within the picture if |x| <= k (D + z): so D is the greatest |x| / k - z, for x and y alike.
     """
-    points = np.concatenate([item.vertices.reshape(-1, 3) for item in objects if not item.hidden] + [
-        objects[i.object].vertices.reshape(-1, 3) @ i.world_from_object[:, :3].T + i.world_from_object[:, 3] for i in instances
-    ])  # fmt: skip
+    points = _seen_points(objects, instances)
     lo, hi = points.min(axis=0), points.max(axis=0)
     middle = lo / 2.0 + hi / 2.0
     forward = unit(np.array(_VIEW))
@@ -132,3 +131,19 @@ def framed(objects: Sequence[MeshObject], instances: Sequence[Instance] = ()) ->
     halves = np.array([half, half * height / width])
     distance = float((np.abs(seen[:, :2]) / halves - seen[:, 2:]).max()) or 1.0
     return Camera.from_view(middle - distance * forward, forward, np.array([0.0, 1.0, 0.0]), _FOV, width, height)
+
+
+def _seen_points(objects: Sequence[MeshObject], instances: Sequence[Instance]) -> FloatArray:
+    """(n, 3): all vertices; of instances with very many in all, the corners of their objects' boxes."""
+    total = sum(3 * len(objects[i.object]) for i in instances)
+    of_object = {i.object: objects[i.object].vertices.reshape(-1, 3) for i in instances}
+    if total > _MOST_POINTS:
+        of_object = {number: _box_corners(points) for number, points in of_object.items()}
+    copies = [of_object[i.object] @ i.world_from_object[:, :3].T + i.world_from_object[:, 3] for i in instances]
+    return np.concatenate([*(item.vertices.reshape(-1, 3) for item in objects if not item.hidden), *copies])
+
+
+def _box_corners(points: FloatArray) -> FloatArray:
+    """(8, 3) of the box around points (n, 3)."""
+    ends = np.stack([points.min(axis=0), points.max(axis=0)])
+    return np.array([[ends[i, 0], ends[j, 1], ends[k, 2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])

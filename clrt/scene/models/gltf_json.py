@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
 from clrt.scene.models.model_file import ModelError
@@ -40,6 +40,7 @@ class Item:
 
     value: dict[str, Any]
     path: str
+    _lists: dict[str, list[Item]] = field(default_factory=dict, repr=False, compare=False)
 
     def fault(self, message: str) -> ModelError:
         """The error to raise for something wrong here."""
@@ -63,11 +64,14 @@ class Item:
 
     def items(self, key: str) -> list[Item]:
         """The objects of the list under `key`; none where there is no list."""
+        if key in self._lists:
+            return self._lists[key]
         found = self._of(key, list) if key in self.value else []
         for i, value in enumerate(found):
             if not isinstance(value, dict):
                 raise ModelError(f"{self.place(key)}[{i}]: expected an object, found {json.dumps(value)[:40]}")
-        return [Item(value, f"{self.place(key)}[{i}]") for i, value in enumerate(found)]
+        self._lists[key] = [Item(value, f"{self.place(key)}[{i}]") for i, value in enumerate(found)]
+        return self._lists[key]
 
     def text(self, key: str, default: str = "") -> str:
         return str(self._of(key, str)) if key in self.value else default
