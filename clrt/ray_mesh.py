@@ -31,6 +31,8 @@ def scene_of(mesh: Any) -> Scene:
     Triangles of exactly zero area are counted in the scene's warnings. Raises MeshError, naming the part and the face.
     """
     if isinstance(mesh, Scene):
+        if mesh.instances or any(item.hidden for item in mesh.objects):
+            raise MeshError("rays are cast at triangles where they are written; this scene has instances or hidden objects, write them out")
         for item in mesh.objects:
             _check_finite(item.vertices, item.name, "triangle")
         return mesh

@@ -177,18 +177,23 @@ def _as_called(prepared: Prepared, features: Features) -> Prepared:
     return prepared if scene is prepared.scene else build_trees(scene, "sah", lambda phase, fraction: None)
 
 
-def open_tracer(
-    prepared: Prepared, features: Features, precision: Precision, device: Device, tell: Progress
-) -> tuple[Buffers, Tracer, str, float]:
-    """Buffers filled and program built; also its source, and the seconds of packing, upload and preparing."""
+def fill_buffers(prepared: Prepared, features: Features, precision: Precision, device: Device) -> tuple[Buffers, str, float]:
+    """Buffers for these features, the source of their program, and the seconds of packing and upload. Raises LimitError."""
     prepared = _as_called(prepared, features)
-    tell("compile", 0.0)
     lanes = precision.lanes(device.info.lanes)
     program.check_limits(precision, lanes, program_shape(prepared, features, True), features)
     start = time.perf_counter()
     buffers = Buffers(device, pack(prepared.scene, prepared.trees, features, precision), features, precision)
     upload_s = time.perf_counter() - start
-    source = program.compose(features, precision, lanes, program_shape(prepared, features, buffers.shared_lights))
+    return buffers, program.compose(features, precision, lanes, program_shape(prepared, features, buffers.shared_lights)), upload_s
+
+
+def open_tracer(
+    prepared: Prepared, features: Features, precision: Precision, device: Device, tell: Progress
+) -> tuple[Buffers, Tracer, str, float]:
+    """Buffers filled and program built; also its source, and the seconds of packing, upload and preparing."""
+    tell("compile", 0.0)
+    buffers, source, upload_s = fill_buffers(prepared, features, precision, device)
     built = program.build(device, source)
     tracer = Tracer(buffers, built)
     tracer.warm_up()

@@ -56,6 +56,7 @@ HOT void tree_leaf(const Geometry *geometry, const int place, const Rays *rays, 
     const int b = place;
     kdtree_trace(geometry, geometry->objects + b, rays, active, shared_origin, any_hit, hits);
     //@ count_object
+    //@ tree_direct
 }
 
 // Of two hits at the same distance the one of the lowest id stays, in whatever order places come: whether `found` comes before `old`.
@@ -85,8 +86,17 @@ HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int share
         const int place = tree_next(geometry, rays, active, hits->t, &walk);
         if (place < 0) return;
         if (ordered) {
+            // Hits that triangles of this place cannot be compared with exactly count by their distance alone.
+            const mask_n before = hits->slot;
+            mask_n other = is_at_least(hits->slot, (mask_n)geometry->slot_count);
+            //@ tree_other
+            if (!any_hit) hits->slot = choose(other, (mask_n)-1, hits->slot);
             tree_leaf(geometry, place, rays, active, shared_origin, any_hit, hits);
-            if (!any_hit) continue;
+            if (!any_hit) {
+                hits->slot = choose(other & is_less(hits->slot, NO_LANES), before, hits->slot);
+                //@ tree_met
+                continue;
+            }
             active &= is_less(hits->slot, NO_LANES);
             if (!any_lane(active)) return;
             continue;

@@ -106,6 +106,18 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
 //@hook hits_begin
         hits.low = hits.t * choose(is_less(hits.t, (real_n)0), R(1.0) + R(8.0) * UNIT_ROUNDOFF, R(1.0) - R(8.0) * UNIT_ROUNDOFF);
 //@end
+//@hook tree_met
+                hits->low = min_n(hits->low, hits->t);
+//@end
+//@hook placed_before
+    // The interval of t in the other space, wider by its roundings.
+    found.t = multiply_add(abs_n(found.t), (real_n)(R(8.0) * UNIT_ROUNDOFF), found.t);
+    found.low = (hits->low * length) * (R(1.0) - R(8.0) * UNIT_ROUNDOFF);
+//@end
+//@hook placed_after
+    found.t = choose(hit, multiply_add(abs_n(found.t), (real_n)(R(8.0) * UNIT_ROUNDOFF), found.t), found.t);
+    found.low = choose(hit, (found.low / length) * (R(1.0) - R(8.0) * UNIT_ROUNDOFF), hits->low);
+//@end
 //@hook tree_ordered
     ordered = 1;  // ties are settled triangle by triangle
 //@end

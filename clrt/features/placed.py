@@ -10,7 +10,7 @@ from clrt.features.shapes import SMOOTH
 from clrt.scene.model import Scene
 from clrt.scene.placed import placement_count, shown
 
-MANY = 48  #: objects and spheres from which on a tree over their boxes is faster than to ask each: docs/kdtree.md has the measurement
+MANY = 16  #: objects and spheres from which on a tree over their boxes is faster than to ask each (docs/kdtree.md has the measurement)
 
 
 def _instance_caller(scene: Scene) -> int | None:

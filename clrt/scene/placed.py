@@ -5,7 +5,7 @@ Numbers of placements: instances in their order, then the objects that are shown
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,23 @@ def placements(scene: Scene) -> Placements:
     matrices = np.array([i.world_from_object for i in scene.instances] + [np.eye(3, 4)] * len(itself)).reshape(-1, 3, 4)
     motion = np.array([scene.objects[i].motion for i in objects.tolist()], np.float64).reshape(-1, 3)
     return Placements(objects, medium, matrices, motion)
+
+
+def seen(scene: Scene, instances: bool = True, motion: bool = True) -> Scene:
+    """The scene without hidden objects of which there is no instance; without its instances, or its objects' motion, where these are left out."""
+    if not instances:
+        scene = replace(scene, instances=())
+    if not motion and any(moves(item) for item in scene.objects):
+        scene = replace(scene, objects=tuple(replace(item, motion=(0.0, 0.0, 0.0)) for item in scene.objects))
+    kept = np.array([not item.hidden for item in scene.objects], np.bool_) | _instanced(scene)
+    if kept.all():
+        return scene
+    number = (np.cumsum(kept) - 1).tolist()
+    return replace(
+        scene,
+        objects=tuple(item for item, there in zip(scene.objects, kept, strict=True) if there),
+        instances=tuple(replace(instance, object=number[instance.object]) for instance in scene.instances),
+    )
 
 
 def object_origins(scene: Scene, origin: FloatArray) -> FloatArray:
