@@ -7,3 +7,7 @@
                 seen = min_n(seen, bound);
             }
 //@end
+//@hook fog_seen
+                if (current.depth_left < frame->depth)
+                    seen = min_n(seen, choose(is_greater(weight, (real_n)0), frame->radiance_clamp / weight, (real_n)INFINITY));
+//@end

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from clrt.features import camera, cutouts, helpers, lamps, motion, placed, rough, sampled, shapes, surfaces, surroundings
+from clrt.features import camera, cutouts, helpers, lamps, motion, placed, rough, sampled, shapes, surfaces, surroundings, volume
 from clrt.features.feature import REAL, Calls, Feature
 from clrt.scene.model import Scene
 
@@ -48,6 +48,7 @@ FEATURES: tuple[Feature, ...] = (
     cutouts.OPACITY_PLACED,
     cutouts.OPACITY_SHADOWS,
     helpers.FACETS,
+    rough.METAL_OPACITY,
     rough.METAL_ROUGH,
     rough.METAL_MAP,
     lamps.SHADOWS,
@@ -57,6 +58,10 @@ FEATURES: tuple[Feature, ...] = (
     helpers.REACH,
     lamps.SUN_SHADOWS,
     lamps.SUN,
+    volume.FOG,
+    helpers.FOG_TINT,
+    volume.FOG_OPACITY,
+    volume.FOG_POINT,
     rough.GLOSS,
     surfaces.FRESNEL,
     surfaces.REFRACTION,
@@ -85,6 +90,7 @@ FEATURES: tuple[Feature, ...] = (
     helpers.ENVIRONMENT_MIS,
     sampled.AREA_LIGHT,
     sampled.AREA_SHADOWS,
+    volume.FOG_AREA,
     helpers.AREA_MIS,
     helpers.AREA_SPHERE,
     surfaces.TEXTURES,

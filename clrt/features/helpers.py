@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from clrt.features import camera, cutouts, lamps, motion, rough, sampled, shapes, surfaces, surroundings
+from clrt.features import camera, cutouts, lamps, motion, rough, sampled, shapes, surfaces, surroundings, volume
 from clrt.features.feature import Feature, Joint
 
 #: effects that draw random numbers
-_SAMPLED: tuple[Feature, ...] = (camera.SAMPLES, camera.LENS, motion.MOTION, motion.EYE_MOTION, sampled.AREA_LIGHT, sampled.INDIRECT, surroundings.ENVIRONMENT_LIGHT, rough.GLOSS, rough.METAL_RAY)
+_SAMPLED: tuple[Feature, ...] = (camera.SAMPLES, camera.LENS, motion.MOTION, motion.EYE_MOTION, sampled.AREA_LIGHT, sampled.INDIRECT, surroundings.ENVIRONMENT_LIGHT, rough.GLOSS, rough.METAL_RAY, volume.FOG)
 #: effects that send rays on from a hit
 _BOUNCING: tuple[Feature, ...] = (surfaces.MIRROR, surfaces.REFRACTION, cutouts.OPACITY_SEEN, sampled.INDIRECT, rough.GLOSS, rough.METAL_RAY)
 #: effects that draw at the hits of rays, not only at the eye
-_DRAWING: tuple[Feature, ...] = (sampled.AREA_LIGHT, sampled.INDIRECT, surroundings.ENVIRONMENT_LIGHT, rough.GLOSS, rough.METAL_RAY)
+_DRAWING: tuple[Feature, ...] = (sampled.AREA_LIGHT, sampled.INDIRECT, surroundings.ENVIRONMENT_LIGHT, rough.GLOSS, rough.METAL_RAY, volume.FOG)
 #: effects that weigh red, green and blue of a ray apart
 _TINTING: tuple[Feature, ...] = (surfaces.ABSORPTION, sampled.INDIRECT, rough.METAL_RAY)
 #: effects that add light without the surface's colour
@@ -49,6 +49,7 @@ BOUNCE = Feature(
 PATH = Feature("path", _any_of(_DRAWING), "path.cl", helper=True)
 PATH_BOUNCE = Feature("path bounce", _all_of(PATH, BOUNCE), "path_bounce.cl", helper=True)
 THROUGHPUT = Feature("throughput", _any_of(_TINTING), "throughput.cl", helper=True)
+FOG_TINT = Feature("fog tint", _all_of(volume.FOG, THROUGHPUT), "fog_tint.cl", helper=True)
 ADDED = Feature("added", _any_of((*_ADDING, _all_of(rough.GLOSS, _any_of(_LIGHT_DRAWING)))), "added.cl", helper=True)
 REACH = Feature("reach", _any_of(_REACHING), "reach.cl", helper=True)
 SCATTER = Feature("scatter", _any_of(_LIGHT_DRAWING), "scatter.cl", helper=True)

@@ -22,7 +22,9 @@ def _falloff_caller(scene: Scene) -> int | None:
 
 
 def sun_caller(scene: Scene) -> int | None:
-    """The first sun."""
+    """The first sun; none in fog, through which no light comes from infinitely far away."""
+    if scene.fog is not None and scene.fog.density > 0.0:
+        return None
     return min((sun.line for sun in scene.suns), default=None)
 
 

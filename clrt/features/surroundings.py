@@ -32,7 +32,9 @@ def _is_lit(material: Material) -> bool:
 
 
 def light_caller(scene: Scene) -> int | None:
-    """An environment that shines on something: one that is only seen needs no samples."""
+    """An environment that shines on something: one that is only seen needs no samples, and none comes through fog."""
+    if scene.fog is not None and scene.fog.density > 0.0:
+        return None
     if scene.environment is None or not scene.environment.radiance.any() or not any(map(_is_lit, used_materials(scene))):
         return None
     return scene.environment.line

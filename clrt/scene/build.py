@@ -97,6 +97,9 @@ def parse_scene(
     faults.raise_if_any()
     if not (draft.lights or draft.spots or draft.suns or environment or any(max(m.emission) > 0.0 for m in draft.materials)):
         warnings.append("there is no light (L); only the ambient part of the materials is seen")
+    fog = draft.fields.get("fog")
+    if fog is not None and fog.density > 0.0 and (draft.suns or environment or any(draft.background)):
+        warnings.append("nothing comes through endless fog: suns, environment and background bring no light")
     warnings += untilted(objects, draft.materials)
     scene = Scene(
         camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,

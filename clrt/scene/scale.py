@@ -60,6 +60,7 @@ def scaled(scene: Scene, exponent: int) -> Scene:
     return replace(
         scene,
         lens=wider(scene.lens),
+        fog=scene.fog and replace(scene.fog, density=math.ldexp(scene.fog.density, -exponent)),
         shutter=scene.shutter and replace(scene.shutter, eye_motion=way(scene.shutter.eye_motion)),
         materials=tuple(map(thinned, scene.materials)),
         camera=replace(scene.camera, eye=times(scene.camera.eye)),
