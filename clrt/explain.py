@@ -18,13 +18,11 @@ from numpy.typing import NDArray
 
 from clrt import __version__
 from clrt.device.context import Device
-from clrt.device.pack import pack
-from clrt.device.program import compose
-from clrt.device.session import Buffers, Tracer
+from clrt.device.session import Tracer
 from clrt.features import Features
 from clrt.features.choice import EFFECTS
 from clrt.precision import Precision
-from clrt.renderer import Prepared, open_tracer, program_shape, run_rows
+from clrt.renderer import Prepared, fill_buffers, open_tracer, run_rows
 from clrt.scene.model import Scene
 from clrt.timing import FEWEST, interleave, median_interval
 
@@ -149,9 +147,8 @@ def explain(prepared: Prepared, precision: Precision, device: Device, tell: Tell
 
 def _sizes(prepared: Prepared, features: Features, precision: Precision, device: Device) -> tuple[int, int]:
     """Bytes of the composed program and of the buffers."""
-    buffers = Buffers(device, pack(prepared.scene, prepared.trees, features, precision), features, precision)
-    shape = program_shape(prepared, features, buffers.shared_lights)
-    return len(compose(features, precision, precision.lanes(device.info.lanes), shape).encode()), buffers.size
+    buffers, source, _ = fill_buffers(prepared, features, precision, device)
+    return len(source.encode()), buffers.size
 
 
 def _texts(source: str, numbers: set[int]) -> dict[int, str]:
