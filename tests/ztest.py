@@ -40,8 +40,9 @@ def device_batches(scene: Scene, samples: int, seeds: range, precision: str = "w
 
 
 def compare(
-    batches: FloatArray, mean: FloatArray, variance_of_mean: FloatArray, level: float = LEVEL, rounding: float = ROUNDING, pixels: bool = True
-) -> Verdict:
+    batches: FloatArray, mean: FloatArray, variance_of_mean: FloatArray, level: float = LEVEL, rounding: float = ROUNDING,
+    pixels: bool = True,
+) -> Verdict:  # fmt: skip
     """Welch's t-test of the batches' mean against `mean`, at all scales.
 
     batches : (k, h, w, 3), k >= 2, independent; mean, variance_of_mean : (h, w, 3) of independent pixels
