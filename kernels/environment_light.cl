@@ -67,7 +67,7 @@ HOT void environment_light(const Geometry *geometry, global const Frame *frame, 
     const real_n chance = load_lanes(density);
     real_n to_light[3], power[3];
     for (int a = 0; a < 3; a++) to_light[a] = load_lanes(direction + a * LANES);
-    mask_n lit = hit->found;
+    mask_n lit = hit->found & is_greater(chance, (real_n)0);
     real_n amount = choose(lit, scatter_phong(geometry, materials, rays, hit, to_light, chance, goes_on), (real_n)0);
     mask_n wanted = is_greater(amount * weight, (real_n)0);
     //@ scatter_lobes
@@ -75,7 +75,7 @@ HOT void environment_light(const Geometry *geometry, global const Frame *frame, 
     if (!any_lane(lit)) return;
     for (int a = 0; a < 3; a++) {
         gather(power[a], environment_cells[3 * (size_t)cell[k] + a]);
-        power[a] /= chance;
+        power[a] = choose(lit, power[a] / chance, (real_n)0);
     }
     //@ environment_visible
     //@ scatter_lit

@@ -2,7 +2,7 @@
 // Needs: environment_light.cl, mis.cl.  Reads: nothing.
 
 //@hook environment_met
-            const mask_n drawn_there = escaped & is_greater(current.pdf, (real_n)0);
+            const mask_n drawn_there = HAVE_ENVIRONMENT_LIGHT ? escaped & is_greater(current.pdf, (real_n)0) : NO_LANES;
             if (any_lane(drawn_there)) {
                 // The samples of the environment bring the rest.
                 real_n chance;
