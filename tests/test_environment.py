@@ -24,7 +24,7 @@ from clrt.precision import RUNGS, rung
 from clrt.reference import render
 from clrt.reference.paths import render_paths
 from clrt.scene.build import load_scene, parse_scene
-from clrt.scene.model import Environment, Indirect, Scene
+from clrt.scene.model import Environment, Fog, Indirect, Scene
 from clrt.scene.sky import default_sky
 from clrt.scene.skylight import WORDS, cosines, row_words, texel_words
 from tests import ztest
@@ -354,6 +354,12 @@ def test_environment_that_is_only_seen_draws_nothing() -> None:
         assert "environment_find" in source
         assert "sampl" not in source
         assert "environment_draw" not in source
+
+
+def test_environment_behind_fog_neither_lights_nor_is_seen() -> None:
+    scene = lit(CAMERA + MATT.replace("0.1 0.6 0.3 9  0", "0 0.6 0.3 9  0"), spiky(4, 8), fog=Fog(0.1), samples=2)
+    assert "environment light" not in Features.of(scene).effects
+    assert not clrt.render(scene).pixels.any()
 
 
 def test_lone_triangle_is_lit_without_rays() -> None:
