@@ -1,4 +1,4 @@
-"""Pictures that are the mean of samples, in float64: antialiasing, lens, motion. Random numbers are the kernels' (clrt.reference.sampler)."""
+"""Pictures that are the mean of samples, in float64: antialiasing, lens, motion. The kernels' random numbers (clrt.reference.sampler)."""
 
 from __future__ import annotations
 
