@@ -23,6 +23,7 @@ HOT void direct_light(const Geometry *geometry, global const Light *lights, int 
         const mask_n shiny = lit & is_greater(cos_reflected, (real_n)0) & is_greater(specular, (real_n)0);
         real_n amount = diffuse * cos_light;
         if (any_lane(shiny)) amount += choose(shiny, specular * pow(choose(shiny, cos_reflected, (real_n)1), exponent), (real_n)0);
+        //@ light_phong
         //@ light_amount
         mask_n wanted = is_greater(amount * weight, (real_n)0);
         //@ light_lobes

@@ -69,7 +69,7 @@ HOT real_n metal_straight(const MetalRough *metal, real_n color) {
         }
         shade.metal = &metal;
 //@end
-//@hook light_amount
+//@hook light_phong
         // Of such hits, `amount` is what effects leave of the light, until it is known.
         amount = choose(shade->metal->here, (real_n)1, amount);
 //@end

@@ -7,6 +7,9 @@
 //@hook begin
     geometry.frame = frame;
 //@end
+//@hook light_amount
+        global const Frame *frame = geometry->frame;
+//@end
 //@hook scatter_share
     global const Frame *frame = geometry->frame;
 //@end
