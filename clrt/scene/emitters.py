@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.scene.model import FloatArray, Scene
+from clrt.scene.model import FloatArray, MeshObject, Scene
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  #: of linear red, green, blue (ITU-R BT.709)
 
@@ -41,13 +42,19 @@ def _shining(scene: Scene) -> NDArray[np.bool_]:
     return np.array([max(m.emission) > 0.0 and m.emission_map < 0 for m in scene.materials], np.bool_)
 
 
+def _standing(scene: Scene) -> Iterator[tuple[MeshObject, FloatArray]]:
+    """Objects that are shown, and instances with their transforms (3, 4); (0, 4) for those that stand where they are written."""
+    yield from ((item, np.zeros((0, 4))) for item in scene.objects if not item.hidden)
+    yield from ((scene.objects[instance.object], instance.world_from_object) for instance in scene.instances)
+
+
 def emitters_of(scene: Scene) -> Emitters:
-    """The emitters of a scene."""
+    """The emitters of a scene, those of instances where they stand."""
     shining, radiance = _shining(scene), np.array([m.emission for m in scene.materials]).reshape(-1, 3)
     corners, ids = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)]
-    for item in scene.objects:
+    for item, matrix in _standing(scene):
         chosen = shining[item.material_ids]
-        corners.append(item.vertices[chosen])
+        corners.append(item.vertices[chosen] @ matrix[:, :3].T + matrix[:, 3] if len(matrix) else item.vertices[chosen])
         ids.append(item.material_ids[chosen].astype(np.int64))
     vertices, material = np.concatenate(corners), np.concatenate(ids)
     area = np.linalg.norm(np.cross(vertices[:, 1] - vertices[:, 0], vertices[:, 2] - vertices[:, 0]), axis=1) / 2.0
