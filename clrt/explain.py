@@ -155,7 +155,7 @@ def _texts(source: str, numbers: set[int]) -> dict[int, str]:
     """The lines of these numbers, blanks at their ends and long tails left out; none where the scene is no file."""
     if not numbers or not Path(source).is_file():
         return {}
-    with Path(source).open(encoding="utf-8", errors="replace") as file:
+    with Path(source).open(encoding="utf-8-sig", errors="replace") as file:
         return {number: line[:_LONGEST_LINE].strip() for number, line in enumerate(islice(file, max(numbers)), 1) if number in numbers}
 
 
