@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from reference_scenes import box, glass, globe, matte, mesh, mirror, plane_y, quad, scene, spheres
 
-from clrt.scene.model import Environment, Indirect, Lens, Material, MeshObject, Scene, Shutter
+from clrt.scene.model import Environment, Fog, Indirect, Lens, Material, MeshObject, PointLight, Scene, Shutter
 
 SIZE = (12, 12)
 FLOOR = Material((0.9, 0.6, 0.3), 0.1, 0.6, 0.4, 8.0)
@@ -95,6 +95,12 @@ def many() -> dict[str, Scene]:
         "opacity, area": still_life([FLOOR, light, replace(matte(diffuse=0.8), opacity=0.4, opacity_line=1)], thing=2,
                                     indirect=Indirect(line=1)),
         "smooth, area": smooth_ball(),
+        "fog, area, point": still_life([FLOOR, light, mirror(0.7)], lights=[(3, 4, -3)], fog=Fog(0.15, (0.9, 0.8, 0.7), 0.4, line=1)),
+        "fog, area of a ball, indirect": still_life([FLOOR, matte(), ball_lamp], height=0.3, fog=Fog(0.1, line=1),
+                                                    indirect=Indirect(line=1)),
+        "fog, gloss, opacity, falloff": still_life(
+            [shine, matte(), replace(matte(diffuse=0.8), opacity=0.4, opacity_line=1)], thing=2,
+            lights=[PointLight((0.5, 1.2, -1.0), (3.0, 3.0, 3.0), falloff=True, line=1)], fog=Fog(0.2, (0.9, 0.9, 0.9), -0.3, line=1)),
         "lens": still_life([FLOOR, light, mirror(0.7)], lights=[(3, 4, -3)], lens=Lens(0.15, 3.0, line=1)),
         "motion": moving([FLOOR, light, matte(diffuse=0.8)], Shutter(0.0, 1.0, line=1), lights=[(3, 4, -3)]),
         "motion of the eye, mirror, environment": moving([FLOOR, replace(light, emission=(0.0, 0.0, 0.0)), mirror(0.7)],
