@@ -32,6 +32,7 @@ bench: $(VENV)/bench.stamp ## measure, into bench-results/; BENCH=--write-docs f
 docs: $(VENV)/bench.stamp ## fill the tables of the documentation: the hard cases, then what `make bench` measures; many minutes
 	$(BIN)/clrt verify --markdown docs/numerics.md
 	$(BIN)/python -m clrt.bench --write-docs
+	$(BIN)/python -m clrt.bench.effects --write-docs
 
 clean: ## remove .venv, out/ and caches
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache
