@@ -69,8 +69,9 @@ class Image:
         return out
 
     def save(self, path: str | PathLike[str], *, srgb: bool = False) -> None:
-        """Write a .png or .ppm, whole or not at all; `srgb` encodes, else the linear values are written. An .exr holds them unclamped. A biased picture
-        says so in the file, in a comment.
+        """Write a .png or .ppm, whole or not at all; `srgb` encodes, else the linear values are written. An .exr holds them unclamped.
+
+        A biased picture says so in the file, in a comment.
 
         Raises ClrtError for any other ending, for an .exr with `srgb` or without its library, OSError with the path in it where it cannot
         be written.
