@@ -188,7 +188,7 @@ def test_moving_lamp_lights_from_where_it_is() -> None:
 
 
 def test_pictures_without_sampled_effects_match_the_tracer() -> None:
-    """Phong, shadows, mirrors, glass with absorption, spheres: the tracer's picture on a grid of 24 x 24 places a pixel."""
+    """Phong, shadows, mirrors, glass with absorption, spheres: the tracer's picture on a grid of 16 x 16 places a pixel."""
     glass = replace(Material((1.0, 1.0, 1.0), 0.02, 0.1, 0.3, 20.0, 0.1, 0.8, 1.4), absorb=(0.1, 0.2, 0.5), absorb_line=1)
     full = Material((0.9, 0.6, 0.3), 0.1, 0.6, 0.4, 8.0)
     boxes = [box((-1.6, -0.8, 0.2), (-0.7, 0.3, 1.1)), box((-0.4, -0.9, -1), (0.1, 0, -0.6))]
@@ -196,10 +196,10 @@ def test_pictures_without_sampled_effects_match_the_tracer() -> None:
     balls = spheres((1.1, -0.2, 0.3, 0.8, 2), (0.2, 0.6, 2.5, 1.1, 1))
     s = scene(objects, [full, replace(full, reflect=0.4), glass], [(3, 5, -4), (-4, 3, 0)], balls, eye=(0.1, 0.5, -5), view=(0, -0.1, 1),
               size=(8, 6), depth=4, background=(0.2, 0.3, 0.4))  # fmt: skip
-    fine = render(s.with_size(8 * 24, 6 * 24)).pixels.reshape(6, 24, 8, 24, 3).mean((1, 3))
-    picture = render_paths(s, 1000, 14)
+    fine = render(s.with_size(8 * 16, 6 * 16)).pixels.reshape(6, 16, 8, 16, 3).mean((1, 3))
+    picture = render_paths(s, 600, 14)
     # The grid misses a pixel's integral by less than a row of its cells where edges cross it.
-    error = np.sqrt(picture.variance_of_mean + (1 / 24 / np.sqrt(12)) ** 2 / 24)
+    error = np.sqrt(picture.variance_of_mean + (1 / 16 / np.sqrt(12)) ** 2 / 16)
     assert np.sqrt(picture.variance_of_mean).max() < 0.02
     assert (np.abs(picture.mean - fine) / error).max() < 4.6
 

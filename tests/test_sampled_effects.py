@@ -27,7 +27,7 @@ def allowed(name: str) -> float:
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow]) for name in SCENES])
 def test_means_agree_with_the_reference(name: str) -> None:
-    picture = render_paths(SCENES[name], 1000 if name in QUICK else 2500, 1)
+    picture = render_paths(SCENES[name], 800 if name in QUICK else 2500, 1)
     batches = device_batches(SCENES[name], 64, range(12))
     assert np.sqrt(picture.variance_of_mean).mean() < 0.05 * picture.mean.mean()
     assert_same(batches, picture.mean, picture.variance_of_mean, allowed(name))
