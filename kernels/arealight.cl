@@ -129,9 +129,11 @@ HOT void arealight_light(const Geometry *geometry, global const Frame *frame, gl
             // What the hits send out by themselves.
             real_n glow[3], share = (real_n)1;
             for (int a = 0; a < 3; a++) gather(glow[a], materials[hit.material[k]].emission[a]);
+            //@ arealight_glow
             const mask_n shines = hit.found & is_greater(max_n(max_n(glow[0], glow[1]), glow[2]), (real_n)0);
             if (any_lane(shines)) {
                 //@ arealight_share
+                //@ arealight_found
                 for (int a = 0; a < 3; a++) shade.added[a] += choose(shines, share * glow[a], (real_n)0);
             }
         }

@@ -177,3 +177,18 @@ def test_scene_without_it_holds_nothing_of_it() -> None:
 def test_wrong_line_is_refused_where_it_is_wrong(lines: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         parse_scene(BALL + lines)
+
+
+def test_picture_of_emission_multiplies_what_is_seen_of_it(device: Device) -> None:
+    """Nothing else lights the wall: it shows emission times texel, seen directly and by a mirror."""
+    plain = parse_scene(
+        "E 0 0 -4\nV 0 0 1\nF 1\nR 1 1\nM 1 1 1 0 0 0 1 0\narealight 2 3 4\nT -9 -9 0 9 -9 0 0 9 0\nO\n"
+        "M 1 1 1 0 0 0 1 0.5\nT -9 -9 -5 9 -9 -5 0 9 -5\n"
+    )  # fmt: skip
+    texels = np.full((1, 1, 4), (51, 102, 255, 255), np.uint8)
+    mesh = tuple(replace(o, uvs=np.zeros((1, 3, 2))) for o in plain.objects)
+    lit = tuple(replace(m, emission_map=0 if max(m.emission) > 0 else -1) for m in plain.materials)
+    mapped = replace(plain, objects=mesh, textures=(Texture(Picture(texels), srgb=False),), materials=lit)
+    np.testing.assert_allclose(clrt.render(mapped).pixels[0, 0], [0.4, 1.2, 4.0], rtol=1e-6)
+    behind = replace(mapped, camera=replace(mapped.camera, corners=-mapped.camera.corners))
+    np.testing.assert_allclose(clrt.render(behind).pixels[0, 0], [0.2, 0.6, 2.0], rtol=1e-6)

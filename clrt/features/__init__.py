@@ -89,6 +89,7 @@ FEATURES: tuple[Feature, ...] = (
     surroundings.ENVIRONMENT_SHADOWS,
     helpers.ENVIRONMENT_MIS,
     sampled.AREA_LIGHT,
+    cutouts.GLOW_MAP,
     sampled.AREA_SHADOWS,
     volume.FOG_AREA,
     helpers.AREA_MIS,

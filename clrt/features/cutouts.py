@@ -36,6 +36,11 @@ def _metal_map_caller(scene: Scene) -> int | None:
     return min((scene.textures[i].line for i in numbers if i >= 0), default=None)
 
 
+def _glow_map_caller(scene: Scene) -> int | None:
+    numbers = (m.emission_map for m in used_materials(scene) if max(m.emission) > 0.0)
+    return min((scene.textures[i].line for i in numbers if i >= 0), default=None)
+
+
 def _round_picture_caller(scene: Scene) -> int | None:
     """A picture on a round primitive."""
     used = [scene.materials[i] for i in np.unique(scene.spheres.material_ids).tolist()]
@@ -73,9 +78,10 @@ NORMAL_MAP = Feature(
 NORMAL_GLOBE = Feature("round normal map", Joint((NORMAL_MAP, shapes.SPHERES), every=True), "normalmap_globe.cl", helper=True)
 NORMAL_PLACED = Feature("placed normal map", Joint((NORMAL_MAP, placed.PLACED), every=True), "normalmap_placed.cl", helper=True)
 _METAL_MAPS = Feature("metal maps", _metal_map_caller, "texture.cl")  #: what calls for pictures besides effects above
+_GLOW_MAPS = Feature("glow maps", _glow_map_caller, "texture.cl", needs=(sampled.AREA_LIGHT,))  #: as well
 PICTURES = Feature(
     "pictures",
-    Joint((surfaces.TEXTURES, ALPHA, NORMAL_MAP, _METAL_MAPS)),
+    Joint((surfaces.TEXTURES, ALPHA, NORMAL_MAP, _METAL_MAPS, _GLOW_MAPS)),
     "texture.cl",
     parameters=(
         ("textures", "global const Texture *textures"),
@@ -85,4 +91,8 @@ PICTURES = Feature(
     ),
     helper=True,
 )
+GLOW_MAP = Feature(
+    "area light map", _glow_map_caller, "arealight_map.cl", material=(("emission_map", np.int32),), needs=(sampled.AREA_LIGHT, PICTURES),
+    helper=True,
+)  # fmt: skip
 GLOBE = Feature("globe", _round_picture_caller, "globe.cl", needs=(shapes.SPHERES, PICTURES), helper=True)
