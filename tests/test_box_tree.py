@@ -20,7 +20,8 @@ def _leaves(tree: BoxTree) -> tuple[list[int], int]:
             found.append(-2 - int(tree.child[node]))
             continue
         for child in (int(tree.child[node]), int(tree.child[node]) + 1):
-            assert (tree.lo[node] <= tree.lo[child]).all() and (tree.hi[child] <= tree.hi[node]).all()
+            assert (tree.lo[node] <= tree.lo[child]).all()
+            assert (tree.hi[child] <= tree.hi[node]).all()
             waiting.append((child, depth + 1))
     assert len(seen) == len(tree.child)
     return found, deepest
@@ -31,7 +32,8 @@ def _leaves(tree: BoxTree) -> tuple[list[int], int]:
 def test_tree_holds_every_box_once_within_its_depth(kind: str, count: int) -> None:
     rng = np.random.default_rng(count)
     middle = {
-        "spread": rng.uniform(-5, 5, (count, 3)), "same": np.ones((count, 3)), "line": np.arange(count)[:, None] * np.array([1.0, 0.0, 0.0]),
+        "spread": rng.uniform(-5, 5, (count, 3)), "same": np.ones((count, 3)),
+        "line": np.arange(count)[:, None] * np.array([1.0, 0.0, 0.0]),
         "doubling": np.exp2(np.arange(count) % 300)[:, None] * np.array([1.0, 0.0, 0.5]),
     }[kind]  # fmt: skip
     half = rng.uniform(0, 1, (count, 3))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import PIL.Image as PillowImage
@@ -38,19 +40,22 @@ def _block(name: str, material: str, hidden: str = "yes") -> str:
     return f"{material}\nobject {name} hidden={hidden}\n{triangles}O\n"
 
 
-def _at(x: float, y: float, z: float, name: str = "block", keys: str = "") -> str:
-    """An instance whose middle stands at a point: the object's own middle is taken to the origin by an instance of its own first."""
+def _at(x: float, y: float, z: float, name: str, keys: str = "") -> str:
     return f"instance {name} {x} {y} {z} {keys}\n"
 
 
 def _centred(name: str) -> str:
+    """An instance to be instanced, with the block's middle at the origin."""
     return f"instance {name} -100 -50 20 name={name}0 hidden=yes\n"
 
 
 PLAIN = "M 0.9 0.5 0.3 0.1 0.8 0.4 20 0"
 MIRROR = "M 0.9 0.9 0.9 0.05 0.3 0.4 40 0.6"
 GLASS = "M 1 1 1 0.02 0.1 0.5 60 0.1 0.8 1.5"
-THREE = _at(-1.2, 0, 1, "block0", "turn_y=30 turn_x=20") + _at(1.3, 0.2, 0.4, "block0", "scale=1.3 turn_z=75") + _at(0.2, -0.2, -1, "block0", "scale=0.5")
+THREE = (
+    _at(-1.2, 0, 1, "block0", "turn_y=30 turn_x=20") + _at(1.3, 0.2, 0.4, "block0", "scale=1.3 turn_z=75")
+    + _at(0.2, -0.2, -1, "block0", "scale=0.5")
+)  # fmt: skip
 SMOOTH = (
     "M 0.4 0.7 0.9 0.1 0.8 0.4 30 0\nobject dome hidden=yes\n"
     "T -1 0 -1  0 0.6 0  1 0 -1   -0.5 0.6 -0.5  0 1 0  0.5 0.6 -0.5\nT 1 0 -1  0 0.6 0  0 0 1.2   0.5 0.6 -0.5  0 1 0  0 0.6 0.5\n"
@@ -62,11 +67,15 @@ SCENES = {
     "glass": CAMERA + FLOOR + _block("block", GLASS) + _centred("block") + THREE,
     "glass that overlaps and absorbs": CAMERA + FLOOR + _block("block", GLASS) + "absorb 0.5 0.2 0.1\n" + _centred("block")
     + _at(-0.3, 0, 0, "block0", "turn_y=30 scale=1.5") + _at(0.3, 0.1, 0.2, "block0", "scale=1.5 turn_z=20") + "S 0 0 -1 0.6\n",
-    "three scales": CAMERA + FLOOR + _block("block", MIRROR) + _centred("block") + _at(0, 0, 0, "block0", "scale_x=2 scale_y=0.4 scale_z=1.4 turn_y=40"),
-    "smooth": CAMERA + FLOOR + SMOOTH + "instance dome -1.2 -0.6 0 scale=1.2 turn_y=25\ninstance dome 1 0 0.5 scale=0.8 turn_x=-40 turn_z=20\n",
+    "three scales": CAMERA + FLOOR + _block("block", MIRROR) + _centred("block")
+    + _at(0, 0, 0, "block0", "scale_x=2 scale_y=0.4 scale_z=1.4 turn_y=40"),
+    "smooth": CAMERA + FLOOR + SMOOTH
+    + "instance dome -1.2 -0.6 0 scale=1.2 turn_y=25\ninstance dome 1 0 0.5 scale=0.8 turn_x=-40 turn_z=20\n",
     "itself, too": CAMERA + FLOOR + _block("block", PLAIN, "no") + _centred("block") + THREE,
-    "sun": CAMERA + "sun -1 2 -2\n" + FLOOR + SMOOTH + "instance dome 0 -0.6 0 scale=1.2 turn_y=25\ninstance dome 1 0 -0.8 scale=0.5 turn_z=20\n",
-    "one triangle": CAMERA + PLAIN + "\nobject one\nT -1 -1 1 -1 1 1 1 -1 1\nO\ninstance one 0.3 0.2 -0.5\ninstance one -0.4 0 -1 turn_y=15 scale=0.7\n",
+    "sun": CAMERA + "sun -1 2 -2\n" + FLOOR + SMOOTH
+    + "instance dome 0 -0.6 0 scale=1.2 turn_y=25\ninstance dome 1 0 -0.8 scale=0.5 turn_z=20\n",
+    "one triangle": CAMERA + PLAIN + "\nobject one\nT -1 -1 1 -1 1 1 1 -1 1\nO\n"
+    + "instance one 0.3 0.2 -0.5\ninstance one -0.4 0 -1 turn_y=15 scale=0.7\n",
 }  # fmt: skip
 
 
@@ -87,7 +96,15 @@ def _compare(scene: Scene, pixels: np.ndarray, margins: np.ndarray, reference: n
     assert reference.std() > 1e-2
 
 
-@pytest.mark.parametrize("name", SCENES)
+QUICK = ("mirrors and spheres", "glass that overlaps and absorbs", "smooth")
+
+
+def _slow(values: Iterable[Any], quick: Iterable[Any]) -> list[Any]:
+    """All values for a test; all but the quick ones are for the long run: each is a program to compile."""
+    return [value if value in quick else pytest.param(value, marks=pytest.mark.slow) for value in values]
+
+
+@pytest.mark.parametrize("name", _slow(SCENES, QUICK))
 def test_instances_match_reference_and_scene_written_out(name: str) -> None:
     scene = parse_scene(SCENES[name])
     reference = clrt.reference.render(scene)
@@ -98,14 +115,14 @@ def test_instances_match_reference_and_scene_written_out(name: str) -> None:
     _compare(scene, pixels, reference.margin, written, 1e-4 if "glass" in name or "mirror" in name else BOUND)
 
 
-@pytest.mark.parametrize("precision", sorted(RUNGS))
+@pytest.mark.parametrize("precision", _slow(sorted(RUNGS), ("exact",)))
 def test_every_rung_matches_the_reference(precision: str) -> None:
     scene = parse_scene(SCENES["glass"]).with_size(32, 32)
     reference = clrt.reference.render(scene)
     _compare(scene, clrt.render(scene, precision=precision).pixels, reference.margin, reference.pixels, 1e-4)
 
 
-@pytest.mark.parametrize("lanes", [16, 8, 4, 1])
+@pytest.mark.parametrize("lanes", _slow((16, 8, 4, 1), (4,)))
 def test_every_packet_width_matches_the_reference(device: Device, lanes: int) -> None:
     scene = parse_scene(SCENES["smooth"]).with_size(37, 29)
     narrow = replace(device, info=replace(device.info, lanes=lanes))
@@ -117,7 +134,8 @@ def test_every_packet_width_matches_the_reference(device: Device, lanes: int) ->
 
 def test_textures_and_shining_triangles_go_with_the_instance() -> None:
     """What shines lights from where it is placed: emitters of the instance are those of the triangles written out."""
-    text = CAMERA + FLOOR + "M 1 1 1 0 0 0 1 0\narealight 3 2 1\nobject lamp hidden=yes\nT 0 0 0 1 0 0 0 1 0\nO\ninstance lamp 1 2 3 scale=2 turn_x=90\n"
+    text = CAMERA + FLOOR + "M 1 1 1 0 0 0 1 0\narealight 3 2 1\nobject lamp hidden=yes\nT 0 0 0 1 0 0 0 1 0\nO\n"
+    text += "instance lamp 1 2 3 scale=2 turn_x=90\n"
     scene = parse_scene(text)
     found, written = emitters_of(scene), emitters_of(expanded(scene))
     np.testing.assert_allclose(found.vertices, [[[1, 2, 3], [3, 2, 3], [1, 2, 5]]], atol=1e-12)
@@ -180,7 +198,8 @@ def test_rays_refuse_a_scene_with_instances() -> None:
 
 def test_transforms_of_instances_of_instances_are_put_together() -> None:
     """(1, 0, 0), doubled, turned from x to y, shifted; then turned from y to z and shifted: by hand."""
-    text = CAMERA + PLAIN + "\nobject one\nT 1 0 0 0 0 0 0 1 0\nO\ninstance one 5 0 0 scale=2 turn_z=90 name=first\ninstance first 0 0 1 turn_x=90\n"
+    text = CAMERA + PLAIN + "\nobject one\nT 1 0 0 0 0 0 0 1 0\nO\ninstance one 5 0 0 scale=2 turn_z=90 name=first\n"
+    text += "instance first 0 0 1 turn_x=90\n"
     first, second = parse_scene(text).instances
     point = np.array([1.0, 0.0, 0.0, 1.0])
     np.testing.assert_allclose(first.world_from_object @ point, [5, 2, 0], atol=1e-15)
@@ -208,7 +227,8 @@ def _rabbits(count: int, triangles: int) -> Scene:
         f"instance rabbit {i % side - side / 2} 0 {i // side} turn_y={rng.uniform(0, 360):.1f} scale={rng.uniform(0.6, 1.1):.2f}\n"
         for i in range(count)
     )
-    return parse_scene("E 0 4 -8\nV 0 -0.3 1\nF 50\nR 64 64\nL 50 60 -50\n" + PLAIN + "\nobject rabbit hidden=yes\n" + corners + "O\n" + lines)
+    camera = "E 0 4 -8\nV 0 -0.3 1\nF 50\nR 64 64\nL 50 60 -50\n"
+    return parse_scene(camera + PLAIN + "\nobject rabbit hidden=yes\n" + corners + "O\n" + lines)
 
 
 def test_memory_grows_by_the_transforms_alone(device: Device) -> None:
@@ -226,7 +246,7 @@ def test_ten_thousand_rabbits_take_the_memory_of_one(device: Device) -> None:
     assert all_of_them.picture().std() > 0.05
 
 
-@pytest.mark.parametrize("precision", ["watertight", "exact"])
+@pytest.mark.parametrize("precision", _slow(("watertight", "exact"), ("watertight",)))
 def test_tree_over_many_objects_gives_the_picture_of_the_loop(monkeypatch: pytest.MonkeyPatch, precision: str) -> None:
     """Objects and spheres that overlap, some of them twice in the same place: of equal distances the lowest id counts in either."""
     rng = np.random.default_rng(5)
@@ -242,9 +262,9 @@ def test_tree_over_many_objects_gives_the_picture_of_the_loop(monkeypatch: pytes
     for many in (16, 10**9):
         monkeypatch.setattr("clrt.features.placed.MANY", many)
         pictures.append(clrt.render(scene, precision=precision).pixels)
-    assert ("object tree" in {f.name for f in Features.of(scene).active}) is False
-    if precision == "exact":  # there the end of a tie between a sphere and a triangle is within rounding
-        assert np.abs(pictures[0] - pictures[1]).max(-1).astype(bool).mean() < 0.002
+    assert "object tree" not in {f.name for f in Features.of(scene).active}, "the second picture is the loop's"
+    if precision == "exact":  # the last digits of a distance depend on which stage decided it, and that on what was met before
+        assert (np.abs(pictures[0] - pictures[1]).max(-1) > BOUND).mean() < 0.002
     else:
         assert np.array_equal(*pictures)
 
@@ -257,7 +277,8 @@ def test_few_objects_keep_the_loop() -> None:
 @pytest.mark.slow
 def test_ten_thousand_spheres_are_faster_by_the_tree(monkeypatch: pytest.MonkeyPatch, device: Device) -> None:
     rng = np.random.default_rng(6)
-    balls = "".join("S " + " ".join(f"{x:.4f}" for x in row) + " 0.05\n" for row in rng.uniform((-4, -1, 0), (4, 3, 8), (10_000, 3)).tolist())
+    centres = rng.uniform((-4, -1, 0), (4, 3, 8), (10_000, 3)).tolist()
+    balls = "".join("S " + " ".join(f"{x:.4f}" for x in row) + " 0.05\n" for row in centres)
     scene, seconds = parse_scene(CAMERA + FLOOR + PLAIN + "\n" + balls).with_size(64, 64), []
     for many in (16, 10**9):
         monkeypatch.setattr("clrt.features.placed.MANY", many)

@@ -13,8 +13,8 @@ from clrt.scene import placed
 
 BOX_POINTS = 2e8  #: instances times corners of triangles up to which boxes are tight: about a second
 _FIRST_LEAF = -2
-#: what rays may be off where they meet the box of a placement, in roundings of the longest way: 2 + 3 of origin and box, 2 + 3 of direction and
-#: length in object space (placed.cl), and as much again
+#: what rays may be off where they meet the box of a placement, in roundings of the longest way: 2 + 3 of origin and box, 2 + 3 of
+#: direction and length in object space (placed.cl), and as much again
 _PLACED_SLACK = 20.0
 
 
@@ -72,6 +72,9 @@ def _longest_way(packed: Packed, lo: FloatArray, hi: FloatArray) -> float:
     scene = packed.scene
     starts = [scene.camera.eye, *(np.asarray(light.position) for light in scene.lights_with_position)]
     reach = max(float(np.abs(start - packed.origin).sum()) for start in starts)
-    moves = 0.0 if scene.shutter is None else float(np.abs(np.multiply(scene.shutter.eye_motion, [[scene.shutter.open], [scene.shutter.close]])).sum(1).max())
+    shutter = scene.shutter
+    moves = 0.0
+    if shutter is not None:
+        moves = float(np.abs(np.multiply(shutter.eye_motion, [[shutter.open], [shutter.close]])).sum(1).max())
     lens = 0.0 if scene.lens is None else 3.0 * scene.lens.radius
     return max(reach + moves + lens, float(np.maximum(np.abs(lo), np.abs(hi)).sum(1).max(initial=0.0)))

@@ -8,7 +8,6 @@ trees' leaves first name them ("slots"), which keeps a leaf's triangles near eac
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +25,7 @@ from clrt.scene.placed import object_origins, placed_boxes, placements
 
 
 def local_origin(scene: Scene) -> FloatArray:
-    """The point coordinates are rounded relative to: the middle of all triangles that are seen, or of the smallest sphere where there are none.
+    """The point coordinates are rounded relative to: the middle of all triangles that are seen; without any, of the smallest sphere.
 
     A large sphere, such as a floor, does not move it: its centre is far from what is seen of it.
     """

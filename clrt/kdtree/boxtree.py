@@ -22,7 +22,7 @@ _SPARE = 8  #: levels beyond those of a balanced tree
 
 @dataclass(frozen=True, eq=False)
 class BoxTree:
-    """m nodes, the root first. lo, hi : (m, 3) float64; child : (m,) number of the first of two children in a row; _FIRST_LEAF - i: box i."""
+    """m nodes, the root first. lo, hi : (m, 3) float64; child : (m,) number of the first of two children in a row, or -2 - i for box i."""
 
     lo: F64
     hi: F64

@@ -33,8 +33,8 @@ def _moved(item: MeshObject, instance: Instance) -> MeshObject:
     inverse = np.linalg.inv(linear)
     smooth = None if item.vertex_normals is None else _unit(_times(item.vertex_normals, inverse.T))
     x, y, z = _times(np.array(item.motion, np.float64), linear).tolist()
-    return replace(item, vertices=_times(item.vertices, linear) + shift, normals=_unit(_times(item.normals, inverse.T)), vertex_normals=smooth,
-                   name=instance.name, hidden=False, motion=(x, y, z))  # fmt: skip
+    vertices, normals = _times(item.vertices, linear) + shift, _unit(_times(item.normals, inverse.T))
+    return replace(item, vertices=vertices, normals=normals, vertex_normals=smooth, name=instance.name, hidden=False, motion=(x, y, z))
 
 
 def _times(vectors: FloatArray, matrix: FloatArray) -> FloatArray:

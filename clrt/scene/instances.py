@@ -77,7 +77,8 @@ def build_instances(
     made = [instance for call in calls if (instance := _instance(call, named, places, faults)) is not None]
     shown_ones = tuple(i for i, call in made if call.text("hidden") == "no")
     hidden = [c for c in found.words if c.name in ("object", "instance", "mesh") and c.text("hidden") == "yes"]
-    if hidden and not shown_ones and all(o.hidden for o in named) and not len(found.lines_of("S")) and not any(map(faults.on_line, [c.line for c in calls])):
+    anything = shown_ones or not all(o.hidden for o in named) or len(found.lines_of("S"))
+    if hidden and not anything and not any(faults.on_line(c.line) for c in calls):
         faults.add(hidden[0].line, hidden[0].column, "everything is hidden; place an instance of it, or leave out hidden=yes")
     return named, shown_ones
 
@@ -88,7 +89,8 @@ def _places(meshes: Mapping[int, int], found: Declarations, calls: list[WordCall
     for call in (c for c in found.words if c.name == "object" or (c.name in ("instance", "mesh") and c.text("name"))):
         name = call.text("name")
         if name in lines:
-            faults.add(call.line, call.columns.get("name", call.column), f"a second {shown(name)}; the first is line {lines[name]}, give one another name")
+            what = f"a second {shown(name)}; the first is line {lines[name]}, give one another name"
+            faults.add(call.line, call.columns.get("name", call.column), what)
             continue
         lines[name] = call.line
         at = object_at(found, call.line) if call.name == "object" else meshes.get(call.line)
@@ -106,13 +108,12 @@ def _instance(
         inner = places.calls.get(of)
         if inner is None:
             if at is call:
-                known = [*places.objects, *places.calls]
-                listed = f" (the names: {', '.join(known[:10])}{', ...' if len(known) > 10 else ''})" if known else '; name an object by a line such as "object rabbit"'
-                faults.add(call.line, call.columns["of"], f"no object is called {shown(of)}{did_you_mean(of, known)}{listed}")
+                faults.add(call.line, call.columns["of"], f"no object is called {shown(of)}{_names_there_are(of, places)}")
             return None
         if inner.line in seen:
             if inner is call:
-                faults.add(call.line, call.columns["of"], f"an instance of itself{'' if at is call else f', by way of line {at.line}'}; name an object")
+                way = "" if at is call else f", by way of line {at.line}"
+                faults.add(call.line, call.columns["of"], f"an instance of itself{way}; name an object")
             return None
         seen.add(inner.line)
         matrix, at = _then(_transform(inner), matrix), inner
@@ -120,6 +121,13 @@ def _instance(
     if _check_scale(call, matrix, item, faults):
         return Instance(places.objects[of], matrix, call.line, call.text("name") or f"instance of line {call.line}"), call
     return None
+
+
+def _names_there_are(name: str, places: _Places) -> str:
+    known = [*places.objects, *places.calls]
+    if not known:
+        return '; name an object by a line such as "object rabbit"'
+    return f"{did_you_mean(name, known)} (the names: {', '.join(known[:10])}{', ...' if len(known) > 10 else ''})"
 
 
 def _check_scale(call: WordCall, matrix: FloatArray, item: MeshObject, faults: Faults) -> bool:
@@ -130,7 +138,7 @@ def _check_scale(call: WordCall, matrix: FloatArray, item: MeshObject, faults: F
         faults.add(call.line, call.column, what)
         return False
     if item.vertex_normals is not None and scales.max() > scales.min() * (1.0 + _SAME_SCALE):
-        what = f"{shown(item.name)} has normals at its corners (T with 18 numbers), which need one scale for all axes; leave scale_x, scale_y, scale_z out"
+        what = f"{shown(item.name)} has normals at its corners, which need one scale for all axes; leave scale_x, scale_y, scale_z out"
         faults.add(call.line, call.column, what)
         return False
     return True

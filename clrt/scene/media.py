@@ -18,7 +18,7 @@ _PROBES = np.array([[0.5281, 0.6713, 0.5197], [-0.4517, 0.3391, 0.8253], [0.2141
 
 
 def refracting_materials(scene: Scene) -> IntArray:
-    """(objects + spheres + instances,): the first material of each object with Refract > 0; NONE where there is none, or the object is hidden."""
+    """(objects + spheres + instances,): the first material of each object with Refract > 0; NONE where there is none, or it is hidden."""
     lets_through = np.array([m.refract > 0.0 for m in scene.materials], bool)
     used = [np.unique(item.material_ids) for item in scene.objects]
     first = [next((int(i) for i in ids if lets_through[i]), NONE) for ids in used]
@@ -43,7 +43,8 @@ def _boxes(scene: Scene, which: NDArray[np.int64]) -> tuple[FloatArray, FloatArr
 def ranks(scene: Scene) -> IntArray:
     """(objects + spheres + instances,): where several overlap, the one of the highest rank has the say; NONE for those that are not glass.
 
-    One whose box lies inside another's outranks it; of others the one whose material comes later, then the later: objects, instances, spheres.
+    One whose box lies inside another's outranks it; of others the one whose material comes later, then the later of objects, instances,
+    spheres.
     """
     materials = refracting_materials(scene)
     which = np.flatnonzero(materials != NONE)

@@ -49,7 +49,7 @@ def _instanced(scene: Scene) -> BoolArray:
 
 
 def _itself(scene: Scene) -> list[int]:
-    """Objects at their own place that are placements there, too: those that move, and those with instances, whose coordinates may be far from all else."""
+    """Objects that are placements at their own place, too: those that move, and those with instances, which may be far from all else."""
     instanced = _instanced(scene).tolist()
     return [i for i, item in enumerate(scene.objects) if not item.hidden and (instanced[i] or moves(item))]
 
@@ -78,7 +78,7 @@ def placements(scene: Scene) -> Placements:
 
 
 def seen(scene: Scene, instances: bool = True, motion: bool = True) -> Scene:
-    """The scene without hidden objects of which there is no instance; without its instances, or its objects' motion, where these are left out."""
+    """The scene without hidden objects that have no instance; without instances, or the objects' motion, where these are left out."""
     if not instances:
         scene = replace(scene, instances=())
     if not motion and any(moves(item) for item in scene.objects):
@@ -95,9 +95,10 @@ def seen(scene: Scene, instances: bool = True, motion: bool = True) -> Scene:
 
 
 def object_origins(scene: Scene, origin: FloatArray) -> FloatArray:
-    """(objects, 3): what each object's coordinates are rounded relative to: `origin`, or the middle of an object that is hidden or has instances."""
+    """(objects, 3): what objects' coordinates are rounded relative to: `origin`, or the middle of one that is hidden or has instances."""
     apart = _instanced(scene) | np.array([item.hidden for item in scene.objects], np.bool_)
-    return np.array([np.mean(box_of(item), axis=0) if own else origin for item, own in zip(scene.objects, apart, strict=True)]).reshape(-1, 3)
+    middles = [np.mean(box_of(item), axis=0) if own else origin for item, own in zip(scene.objects, apart, strict=True)]
+    return np.array(middles).reshape(-1, 3)
 
 
 def box_of(item: MeshObject) -> tuple[FloatArray, FloatArray]:
