@@ -51,7 +51,7 @@ HOT mask_n reach_point(const Geometry *geometry, const Rays *rays, const Hit *hi
 //@hook sphere_meets
         // A ray from a hit starts on its own sphere, though any hit will do; one from a light, which ends there, starts off the light.
         const mask_n starts = own & is_equal(rays->t_min, (real_n)0);
-        meets |= starts;
+        meets |= starts & rays->active;
 //@end
 //@hook sphere_root
         if (any_hit) t = choose(starts, R(2.0) * b, t);
