@@ -1,4 +1,4 @@
-"""GGX surfaces in float64 as docs/conventions.md has them, written for the tests alone: formulas as they stand, integrals by plain midpoints."""
+"""GGX surfaces in float64 as docs/conventions.md has them, for the tests alone: formulas as they stand, integrals by midpoints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rough mirrors and glass: the sampler against its density, albedos, white furnaces, lights by quadrature, the path reference; wrong lines."""
+"""Rough mirrors and glass: draws against their density, albedos, white furnaces, lights by quadrature, the path reference; wrong lines."""
 
 from __future__ import annotations
 
@@ -34,8 +34,9 @@ BALLS = "S -0.8 0 0 1\nS 1.2 -0.2 0.4 0.8\n"
 MEAN = re.compile(r"^# mean \((\d+),(\d+)\) is (\S+) (\S+) (\S+)$", re.MULTILINE)
 
 _DRAW = """
-kernel void probe_ggx(global const real *albedos, global const real *view, global const real *u, global const real *v, global const real *rough,
-                      global real *facet, global real *out, global real *pdf, global real *kept, global real *again) {
+kernel void probe_ggx(global const real *albedos, global const real *view, global const real *u, global const real *v,
+                      global const real *rough, global real *facet, global real *out, global real *pdf, global real *kept,
+                      global real *again) {
     const int i = get_global_id(0) * LANES;
     real_n normal[3] = {(real_n)0, (real_n)0, (real_n)1}, direction[3], m[3], way[3], back[3], chance, met;
     for (int a = 0; a < 3; a++) direction[a] = -load_lanes(view + a * get_global_size(0) * LANES + i);
@@ -59,7 +60,9 @@ kernel void probe_ggx(global const real *albedos, global const real *view, globa
 """
 
 
-def drawn(view: np.ndarray, roughness: np.ndarray | float, count: int, precision: str = "watertight", seed: int = 1) -> dict[str, np.ndarray]:
+def drawn(
+    view: np.ndarray, roughness: np.ndarray | float, count: int, precision: str = "watertight", seed: int = 1
+) -> dict[str, np.ndarray]:
     """Draws of ggx.cl about +z for `view` (3,) or (count, 3), at most 2^15 in one launch."""
     if count > 1 << 15:
         parts = [drawn(view, roughness, 1 << 15, precision, seed + i) for i in range(count >> 15)]
@@ -87,7 +90,7 @@ def test_facets_are_drawn_with_the_density_of_the_visible_ones(device: Device, c
     """Chi-square over cells of facet normals, of D G1 max(o.m, 0) / o_z, by midpoints within each cell."""
     count, alpha, view = 1 << 17, alpha_of(roughness), direction(cosine)
     m = drawn(view, roughness, count)["facet"].astype(np.float64)
-    # Cells of the azimuth and of 1 - sqrt(1 - r), r the squared slope's rank under D cos: there the steep facets that a grazing view sees fill cells.
+    # Cells of the azimuth and of 1 - sqrt(1 - r), r the squared slope's rank under D cos: steep facets, seen when grazing, fill cells.
     q = (m[:, 0] ** 2 + m[:, 1] ** 2) / m[:, 2] ** 2
     rank, phi = 1 - alpha / np.sqrt(q + alpha**2), np.arctan2(m[:, 1], m[:, 0]) / (2 * np.pi) + 0.5
     counts = np.histogram2d(rank, phi, (24, 24), ((0, 1), (0, 1)))[0].astype(np.int64)
@@ -132,7 +135,8 @@ def test_extreme_roughness_and_grazing_views_give_numbers(device: Device) -> Non
     draw = drawn(view, 10.0 ** rng.uniform(-12, 0, count), count)
     for name, values in draw.items():
         assert np.isfinite(values).all(), name
-    assert (draw["kept"] >= 0).all() and (draw["kept"] <= 1.0001).all()
+    assert (draw["kept"] >= 0).all()
+    assert (draw["kept"] <= 1.0001).all()
     np.testing.assert_allclose(np.linalg.norm(draw["out"], axis=1), 1.0, rtol=1e-6)
 
 

@@ -12,7 +12,6 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.polynomial.legendre import leggauss
-from numpy.typing import NDArray
 
 from clrt.scene.model import FloatArray
 
@@ -65,7 +64,7 @@ def lobe_albedo(cosine: FloatArray, alpha: FloatArray) -> tuple[FloatArray, Floa
     return np.asarray((kept * part).sum((-1, -2))), np.asarray((kept * schlick * part).sum((-1, -2)))
 
 
-def stretched(cosine: FloatArray, alpha: FloatArray) -> FloatArray:
+def stretched(cosine: FloatArray, alpha: FloatArray | float) -> FloatArray:
     return np.asarray(np.sqrt(cosine * cosine + alpha * alpha * np.clip((1.0 - cosine) * (1.0 + cosine), 0.0, None)))
 
 
@@ -105,8 +104,9 @@ def diffuse_grazing(cosine: FloatArray) -> FloatArray:
 def share_table() -> FloatArray:
     """(ROUGHNESSES, SHARE_COSINES): what the diffuse part of a metal-rough surface may hand on, at sqrt(alpha) and the root of the cosine.
 
-    Of light from all sides the specular part, divided by its albedo, hands on F0 + (1 - F0) B, the diffuse part (1 - F0) (1 - K) at most, with B the
-    mean of (1 - V.H)^5 over the lobe and K over the cosine. Where B > K these are more than 1: (1 - B) / (1 - K) makes it 1. 25 ms, once.
+    Of light from all sides the specular part, divided by its albedo, hands on F0 + (1 - F0) B, the diffuse part (1 - F0) (1 - K) at most,
+    with B the mean of (1 - V.H)^5 over the lobe and K over the cosine. Where B > K these are more than 1: (1 - B) / (1 - K) makes it 1.
+    Takes 40 ms, once.
     """
     alpha, cosine = alpha_of(chebyshev_nodes(_FIT_ROUGHNESSES))[:, None], chebyshev_nodes(_FIT_COSINES)[None, :] ** 2
     albedo, grazing = lobe_albedo(cosine, alpha)

@@ -1,7 +1,7 @@
 """What rough glass hands on of light from all sides, reflected and refracted: tables for gloss_refraction.cl, by quadrature in float64.
 
-The facets are those of `ggx_albedo`; refraction is masked by G1 on either side (Walter and others 2007). With `fresnel` a facet reflects the share
-F of Fresnel's equations and refracts the rest; without it refracts all, but reflects all where the reflection is total.
+The facets are those of `ggx_albedo`; refraction is masked by G1 on either side (Walter and others 2007). With `fresnel` a facet reflects
+the share F of Fresnel's equations and refracts the rest; without it refracts all, but reflects all where the reflection is total.
 """
 
 from __future__ import annotations

@@ -8,11 +8,18 @@ from clrt.features import camera, cutouts, lamps, motion, rough, sampled, shapes
 from clrt.features.feature import Feature, Joint
 
 #: effects that draw random numbers
-_SAMPLED: tuple[Feature, ...] = (camera.SAMPLES, camera.LENS, motion.MOTION, motion.EYE_MOTION, sampled.AREA_LIGHT, sampled.INDIRECT, surroundings.ENVIRONMENT_LIGHT, rough.GLOSS, rough.METAL_RAY, volume.FOG)
+_SAMPLED: tuple[Feature, ...] = (
+    camera.SAMPLES, camera.LENS, motion.MOTION, motion.EYE_MOTION, sampled.AREA_LIGHT, sampled.INDIRECT,
+    surroundings.ENVIRONMENT_LIGHT, rough.GLOSS, rough.METAL_RAY, volume.FOG,
+)  # fmt: skip
 #: effects that send rays on from a hit
-_BOUNCING: tuple[Feature, ...] = (surfaces.MIRROR, surfaces.REFRACTION, cutouts.OPACITY_SEEN, sampled.INDIRECT, rough.GLOSS, rough.METAL_RAY)
+_BOUNCING: tuple[Feature, ...] = (
+    surfaces.MIRROR, surfaces.REFRACTION, cutouts.OPACITY_SEEN, sampled.INDIRECT, rough.GLOSS, rough.METAL_RAY,
+)  # fmt: skip
 #: effects that draw at the hits of rays, not only at the eye
-_DRAWING: tuple[Feature, ...] = (sampled.AREA_LIGHT, sampled.INDIRECT, surroundings.ENVIRONMENT_LIGHT, rough.GLOSS, rough.METAL_RAY, volume.FOG)
+_DRAWING: tuple[Feature, ...] = (
+    sampled.AREA_LIGHT, sampled.INDIRECT, surroundings.ENVIRONMENT_LIGHT, rough.GLOSS, rough.METAL_RAY, volume.FOG,
+)  # fmt: skip
 #: effects that weigh red, green and blue of a ray apart
 _TINTING: tuple[Feature, ...] = (surfaces.ABSORPTION, sampled.INDIRECT, rough.METAL_RAY)
 #: effects that add light without the surface's colour
@@ -54,8 +61,9 @@ ADDED = Feature("added", _any_of((*_ADDING, _all_of(rough.GLOSS, _any_of(_LIGHT_
 REACH = Feature("reach", _any_of(_REACHING), "reach.cl", helper=True)
 SCATTER = Feature("scatter", _any_of(_LIGHT_DRAWING), "scatter.cl", helper=True)
 FACETS = Feature(
-    "facets", _any_of((rough.GLOSS, rough.METAL_ROUGH)), "ggx.cl", early=True, parameters=(("facet_albedos", "global const real *facet_albedos"),), helper=True
-)
+    "facets", _any_of((rough.GLOSS, rough.METAL_ROUGH)), "ggx.cl", early=True, helper=True,
+    parameters=(("facet_albedos", "global const real *facet_albedos"),),
+)  # fmt: skip
 MIS = Feature("mis", _all_of(_any_of(_LIGHT_DRAWING), _any_of(_RAY_DRAWING)), "mis.cl", helper=True)
 GLOSS_LIGHT = Feature("gloss light", _all_of(rough.GLOSS_MIRROR, SCATTER), "gloss_light.cl", helper=True)
 METAL_LIGHT = Feature("metal light", _all_of(rough.METAL_ROUGH, SCATTER), "metal_rough_light.cl", helper=True)
