@@ -85,7 +85,7 @@ HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int share
     for (;;) {
         const int place = tree_next(geometry, rays, active, hits->t, &walk);
         if (place < 0) return;
-        if (ordered) {
+        if (any_hit || (ordered && place < geometry->tree_solids)) {
             // Hits that triangles of this place cannot be compared with exactly count by their distance alone.
             const mask_n before = hits->slot;
             mask_n other = is_at_least(hits->slot, (mask_n)geometry->slot_count);
@@ -118,6 +118,7 @@ HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int share
         found.slot = choose(nearer, found.slot, hits->slot);
         //@ tree_nearer
         *hits = found;
+        //@ tree_met
     }
 }
 
