@@ -6,7 +6,16 @@
 // By the quotient, not by squares of densities, which overflow.
 HOT real_n mis_share(real_n mine, real_n other) {
     const real_n ratio = other / mine;
-    return choose(is_greater(other, (real_n)0), R(1.0) / (R(1.0) + ratio * ratio), (real_n)1);
+    real_n share = choose(is_greater(other, (real_n)0), R(1.0) / (R(1.0) + ratio * ratio), (real_n)1);
+    //@ mis_of_lights
+    return share;
+}
+
+// The share of a ray that was drawn with density `mine` and met a light that samples of lights draw with `other`.
+HOT real_n mis_drawn_share(real_n mine, real_n other) {
+    real_n share = mis_share(mine, other);
+    //@ mis_of_drawn
+    return share;
 }
 
 //@hook bounce_members

@@ -106,6 +106,16 @@ def test_room_is_that_of_the_reference(lamp: str, end: str) -> None:
     assert_same(device_batches(scene, 32, range(8)), reference.mean, reference.variance_of_mean)
 
 
+@pytest.mark.slow
+def test_panes_that_only_light_samples_pass_lose_no_light() -> None:
+    """Light samples go through the pane, scattered rays do not: what these find of lights cannot stand for it."""
+    pane = "M 0.5 0.5 1  0 1 0 1 0\nopacity 0.3 of=shadow\nT -0.7 1.2 -0.7  0.7 1.2 -0.7  0 1.2 0.7\n"
+    gloss = "M 0.9 0.9 0.9  0 0 0 1 0.8\ngloss 0.4\nS 0.5 1.0 -0.3 0.25\n"
+    scene = parse_scene(ROOM + pane + gloss + "indirect\n")
+    reference = render_paths(scene, 1000, 3)
+    assert_same(device_batches(scene, 64, range(8)), reference.mean, reference.variance_of_mean)
+
+
 def test_clamp_only_darkens_and_is_told(tmp_path: Path) -> None:
     scene = parse_scene(ROOM + LAMPS["glass"] + "indirect\n")
     free, cut = clrt.render(scene, samples=16), clrt.render(replace(scene, indirect=Indirect(0.05, 1)), samples=16)

@@ -77,6 +77,7 @@ FEATURES: tuple[Feature, ...] = (
     surroundings.ENVIRONMENT,
     helpers.THROUGHPUT,
     helpers.MIS,
+    helpers.LIGHTS_ALONE,
     sampled.INDIRECT,
     sampled.CLAMP,
     rough.METAL_RAY,

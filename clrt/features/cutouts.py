@@ -48,8 +48,14 @@ def _round_picture_caller(scene: Scene) -> int | None:
     return min((scene.textures[i].line for i in numbers), default=None)
 
 
+def _pane_caller(scene: Scene) -> int | None:
+    return min((_opacity_line(scene, m) for m in used_materials(scene) if m.translucent and not m.opacity_seen), default=None)
+
+
 #: surfaces that let light pass: how much
 OPACITY = Feature("opacity", _opacity_caller, "opaque.cl", material=(("opacity", REAL),))
+#: what calls for a part below: surfaces that do so for light alone
+SHADOW_PANES = Feature("shadow panes", _pane_caller, "opaque.cl")
 #: what is seen of them, and behind them
 OPACITY_SEEN = Feature(
     "opacity seen", _seen_caller, "opacity.cl", material=(("opacity_seen", np.int32),), rays=("passed",), branches=1, needs=(OPACITY,),
