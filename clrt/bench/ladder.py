@@ -7,12 +7,12 @@ from functools import partial
 from typing import Any
 
 from clrt.bench.scenes import BenchScene, straight
-from clrt.timing import interleave
 from clrt.device.context import Device
 from clrt.features import Features
 from clrt.precision import RUNGS, rung
 from clrt.renderer import build_trees, open_tracer
 from clrt.scene.model import Scene
+from clrt.timing import interleave
 
 BASE = "fast"  #: what the others are compared with
 

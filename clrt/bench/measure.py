@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from clrt.bench.scenes import BenchScene
-from clrt.timing import Series, interleave
 from clrt.bench.versus import opened
 from clrt.device.context import Device
 from clrt.errors import ClrtError
 from clrt.renderer import build_trees, render, run_rows
 from clrt.scene.model import Scene
 from clrt.stats import RunStats
+from clrt.timing import Series, interleave
 
 TREES = ("sah", "median")
 _BASELINE = "brute"

@@ -22,13 +22,13 @@ from numpy.typing import NDArray
 from clrt.bench.machine import cores
 from clrt.bench.peers import Embreex, embreex_available, primary_rays, shadow_rays
 from clrt.bench.scenes import BenchScene, straight
-from clrt.timing import Series, interleave
 from clrt.device.context import Device
 from clrt.device.session import Tracer
 from clrt.features import Features
 from clrt.precision import DEFAULT, rung
 from clrt.renderer import build_trees, open_tracer, render
 from clrt.scene.model import Scene
+from clrt.timing import Series, interleave
 
 Bools = NDArray[np.bool_]
 

@@ -41,7 +41,7 @@ _NARROW = 72  #: columns; with fewer, a block of lines an effect takes the place
 def explain(scene: Path, json_path: Path | None, quiet: bool, **options: Any) -> None:
     """List the effects of SCENE, and the line that calls for each.
 
-    `clrt SCENE --without EFFECT` renders without one. What an effect adds and costs is that of leaving it out, with the effects that need it.
+    `clrt SCENE --without EFFECT` renders without one. What an effect adds and costs is that of leaving it out, with what needs it.
     """
     paths.check_scene(scene)
     paths.check_outputs({"scene": scene}, {"file of effects": None if json_path is kinds.STDOUT else json_path})
@@ -62,7 +62,8 @@ def explain(scene: Path, json_path: Path | None, quiet: bool, **options: Any) ->
 
 def _explain(
     path: Path, progress: PhaseProgress, *, measured: bool, rounds: int, size: tuple[int, int] | None, tree: str, device: str | None,
-    depth: int | None, samples: int | None, seed: int, precision: str, right_handed: bool, split_objects: bool, allow_path: tuple[Path, ...],
+    depth: int | None, samples: int | None, seed: int, precision: str, right_handed: bool, split_objects: bool,
+    allow_path: tuple[Path, ...],
 ) -> Explanation:  # fmt: skip
     from clrt.device.context import open_device
     from clrt.explain import explain, measure
@@ -120,9 +121,8 @@ def effects_table(found: Explanation) -> Table:
         result.columns[column].justify, result.columns[column].no_wrap, result.columns[column].overflow = "left", False, "fold"
     for effect in found.effects:
         line = str(effect.line) if effect.line else "-"
-        result.add_row(
-            Text(effect.name), Text(", ".join(effect.brings)), line, Text(_short(effect.text)), *map(_bytes, (effect.source_bytes, effect.buffer_bytes))
-        )
+        added = map(_bytes, (effect.source_bytes, effect.buffer_bytes))
+        result.add_row(Text(effect.name), Text(", ".join(effect.brings)), line, Text(_short(effect.text)), *added)
     return result
 
 

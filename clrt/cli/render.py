@@ -67,7 +67,7 @@ class Options:
 @click.option("--split-objects", is_flag=True, help="Make each connected component an object, where the scene marks none.")
 @click.option("--camera", type=kinds.whole(1), metavar="N", help="Which camera of a glTF file to look through.  [default: 1]")
 @click.option("--allow-path", type=kinds.file, multiple=True, metavar="DIR", help="Permit the scene to name files in DIR, too.")
-@click.option("--without", multiple=True, metavar="EFFECT", help="Leave out an effect that `clrt explain` lists; may be repeated.")
+@click.option("--without", multiple=True, metavar="EFFECT", help="Leave out an effect of `clrt explain`; may be repeated.")
 @click.option("-q", "--quiet", is_flag=True, help="Print no figures and no progress.")
 def render(**arguments: Any) -> None:
     """Render SCENE to a picture. The same as `clrt SCENE`."""
