@@ -28,7 +28,7 @@ def measure_programs(bench: BenchScene, device: Device) -> list[dict[str, Any]]:
 
 def _row(name: str, scene: Scene, device: Device) -> dict[str, Any]:
     features = Features.of(scene)
-    source, everything = (_source(f, device) for f in (features, Features(tuple((f.name, 0) for f in FEATURES))))
+    source, everything = (_source(f, device) for f in (features, features.with_every()))
     absent = [f for f in FEATURES if f not in features.active]
     return {
         "scene": name, "effects": list(features.effects), "bytes": len(source.encode()), "absent": [f.name for f in absent],
@@ -55,7 +55,7 @@ def absent_bytes(source: str, absent: list[Feature], active: tuple[Feature, ...]
 
 def _names(feature: Feature) -> list[str]:
     """The names that a feature adds to structs and kernel arguments."""
-    return [n for n, _ in feature.material] + [n for n, _, _ in feature.frame] + [n for n, _ in feature.parameters]
+    return [n for n, *_ in (*feature.material, *feature.light, *feature.frame, *feature.parameters)]
 
 
 def _lines_by_file(source: str) -> Iterator[tuple[str, str]]:
