@@ -55,7 +55,7 @@ def absent_bytes(source: str, absent: list[Feature], active: tuple[Feature, ...]
 
 def _names(feature: Feature) -> list[str]:
     """The names that a feature adds to structs and kernel arguments."""
-    return [n for n, *_ in (*feature.material, *feature.light, *feature.frame, *feature.parameters)]
+    return [n for n, *_ in (*feature.material, *feature.frame, *feature.parameters)]
 
 
 def _lines_by_file(source: str) -> Iterator[tuple[str, str]]:
