@@ -31,6 +31,10 @@ def results() -> dict[str, Any]:
             },
             "cores_used": {"clrt without lights": 1.98, "embreex primary": 1.95}, "pixels_that_differ": {"hit": 0, "lit": 7},
         },
+        "incoherent": {
+            "scene": "rabbit", "triangles": 69_463, "rays": 1_000_000, "rays_that_differ": 3,
+            "seconds": {"clrt": series(0.25), "embreex": series(0.125)}, "rates": {"clrt": 4.0, "embreex": 8.0},
+        },
         "ladder": [ladder_row("fast", 1.0), ladder_row("watertight", 1.03), ladder_row("exact", 1.08), ladder_row("double", 2.1)],
         "tests": [tests_row("rabbit", "sah", 23_476, 20, 20.9), tests_row("rabbit", "median", 8_482, 15, 164.5),
                   tests_row("monkey", "sah", 288, 13, 15.6), tests_row("monkey", "median", 258, 10, 53.1)],

@@ -10,18 +10,21 @@ from pathlib import Path
 from typing import Any
 
 import bench_results
+import numpy as np
 import pytest
 
 from clrt.bench import export, report, scenes
+from clrt.bench.incoherent import closed_room, scattered_rays
 from clrt.bench.marks import marks_of
 from clrt.bench.measure import whole_from_sample
 from clrt.bench.programs import absent_bytes
-from clrt.timing import Series, interleave
 from clrt.bench.versus import DARK, LIT, SHADOWED, rates_of
 from clrt.device.program import Shape, compose
 from clrt.errors import ClrtError
 from clrt.features import Features
 from clrt.precision import DEFAULT, rung
+from clrt.rays import RayCaster
+from clrt.timing import Series, interleave
 
 
 def test_contenders_take_turns_and_the_warm_up_is_not_kept() -> None:
@@ -125,7 +128,7 @@ def test_markdown_has_every_row_once() -> None:
     )
     everything = report.markdown(results, report.tables(results), level=3)
     rows = [line for line in everything.splitlines() if line.startswith("| ")]
-    assert len(rows) == 2 * 7 + sum(len(table.rows) for table in report.tables(results)) == 14 + 1 + 2 + 3 + 4 + 4 + 1 + 1
+    assert len(rows) == 2 * 8 + sum(len(table.rows) for table in report.tables(results)) == 16 + 1 + 2 + 3 + 1 + 4 + 4 + 1 + 1
     assert "| both, and shading | 1,500 | 1,501 | 50.0 | 22.0 | 2.27 |" in rows
 
 
@@ -219,6 +222,27 @@ def test_lines_of_an_absent_effect_are_found_where_they_are(tmp_path: Path) -> N
     assert absent_bytes(compose(without, rung(DEFAULT), 4, Shape(16, 5)), lost, without.active) == 0
 
 
+def test_incoherent_rays_are_told_beside_embreex() -> None:
+    results = bench_results.results()
+    shown = report.incoherent_table(results["incoherent"])
+    assert shown.rows == [["rabbit", "69,463", "1,000,000", "4.00", "8.00", "0.50"]]
+    assert "another triangle: 3" in shown.note
+    del results["incoherent"]["rates"]["embreex"], results["incoherent"]["rays_that_differ"]
+    assert report.incoherent_table(results["incoherent"]).rows[0][-2:] == ["-", "-"]
+
+
+def test_scattered_rays_leave_a_mesh_in_a_closed_room() -> None:
+    mesh = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 3, 0], [0, 0, 4]]])
+    origins, directions = scattered_rays(mesh, 20_000, 5)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0, rtol=1e-12)
+    on_large = np.abs(origins[:, 0]) < 1e-3
+    assert abs(on_large.mean() - 6.0 / 6.5) < 0.01, "points are even over the area"
+    cosine = np.abs(directions[on_large][:, 0])
+    assert abs(cosine.mean() - 2.0 / 3.0) < 0.01, "the mean of the cosine, drawn in proportion to it"
+    room = closed_room(mesh)
+    assert RayCaster(np.concatenate([mesh, room]), "watertight").any_hit(origins[:2000], directions[:2000]).all()
+
+
 @pytest.mark.slow
 def test_quick_run_measures_everything(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "clrt.bench", "--quick", "--out", str(tmp_path)]
@@ -227,8 +251,8 @@ def test_quick_run_measures_everything(tmp_path: Path) -> None:
     (path,) = tmp_path.iterdir()
     results = json.loads(path.read_text())
     assert set(results) == {
-        "started", "finished", "quick", "machine", "load_before", "load_after", "plan", "scenes", "trees", "versus", "ladder", "tests",
-        "command", "programs", "marks",
+        "started", "finished", "quick", "machine", "load_before", "load_after", "plan", "scenes", "trees", "versus", "incoherent", "ladder",
+        "tests",         "command", "programs", "marks",
     }  # fmt: skip
     assert {"cpu", "cores", "memory_gib", "os", "python", "opencl_platform", "opencl_driver", "packages"} <= set(results["machine"])
     sphere, rabbit = ("sphere (generated)", False), ("rabbit-like (generated)", True)

@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from clrt.bench import export, machine, measure, report, scenes
+from clrt.bench.incoherent import measure_incoherent
 from clrt.bench.ladder import measure_ladder
 from clrt.bench.marks import marks_of
 from clrt.bench.programs import measure_programs
@@ -63,6 +64,8 @@ def run(folder: Path | None, device_name: str | None, quick: bool) -> dict[str, 
         results["trees"] = [row for scene in loaded for row in measure.measure_trees(scene, plan, device)]
         _tell("rays against embreex")
         results["versus"] = measure_versus(rabbit, plan.versus_size, plan.rounds, device)
+        _tell("incoherent rays")
+        results["incoherent"] = measure_incoherent(rabbit, plan.incoherent_rays, plan.rounds, device)
         _tell("the precision ladder")
         results["ladder"] = measure_ladder(rabbit, plan.versus_size, plan.ladder_rounds, device)
         _tell("tests a ray")

@@ -13,7 +13,7 @@ from clrt.files import atomic_write, check_writable
 
 BEGIN, END = "<!-- bench:begin -->", "<!-- bench:end -->"
 _PLACE = re.compile(rf"{re.escape(BEGIN)}\n.*?{re.escape(END)}", re.S)
-_KEYS = ("started", "quick", "machine", "scenes", "trees", "versus", "ladder", "tests", "command", "programs", "marks")
+_KEYS = ("started", "quick", "machine", "scenes", "trees", "versus", "incoherent", "ladder", "tests", "command", "programs", "marks")
 
 
 def save(results: dict[str, Any], folder: Path) -> Path:

@@ -34,6 +34,7 @@ class Plan:
     brute_limit : pixels times triangles beyond which it takes too long
     brute_count_size : of the picture that its tests are counted in, at most: counting takes longer than tracing
     versus_size, count_size, command_size : of the other measurements
+    incoherent_rays : of rays that go all ways
     ladder_rounds : of the rungs' pictures, whose times lie so near each other that they want more
     """
 
@@ -46,12 +47,13 @@ class Plan:
     count_size: int = 1024
     command_size: int = 512
     ladder_rounds: int = 15
+    incoherent_rays: int = 1_000_000
 
 
 FULL = Plan()
 QUICK = Plan(
     rounds=2, sizes=(32,), sample=16, brute_limit=500_000, brute_count_size=16, versus_size=64, count_size=64, command_size=64,
-    ladder_rounds=2,
+    ladder_rounds=2, incoherent_rays=2000,
 )  # fmt: skip
 
 

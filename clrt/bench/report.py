@@ -30,6 +30,7 @@ def tables(results: dict[str, Any]) -> list[Table]:
     """All tables of a run, the marks first."""
     return [
         marks_table(results["marks"]), trees_table(results["trees"]), versus_table(results["versus"], results["machine"]["cores"]),
+        incoherent_table(results["incoherent"]),
         ladder_table(results["ladder"]), tests_table(results["tests"]), command_table(results["command"]),
         programs_table(results["programs"]),
     ]  # fmt: skip
@@ -98,6 +99,22 @@ def _versus_note(versus: dict[str, Any], cores: int) -> str:
         f"Cores in use, of {cores}: clrt {ours:.2f}, embreex {theirs:.2f}. "
         f"Pixels where only one hits anything: {differ['hit']:,}; where only one sees the light: {differ['lit']:,}."
     )
+
+
+def incoherent_table(incoherent: dict[str, Any]) -> Table:
+    """Million rays a second against the peer's, of rays that go all ways."""
+    rates = incoherent["rates"]
+    own, peer = rates["clrt"], rates.get("embreex")
+    row = [incoherent["scene"], f"{incoherent['triangles']:,}", f"{incoherent['rays']:,}", f"{own:.2f}",
+           "-" if peer is None else f"{peer:.2f}", _times(None if peer is None else own / peer)]  # fmt: skip
+    note = (
+        "From points of the scene's largest mesh in a closed room, in all directions, as indirect light sends them; the same arrays for "
+        "both, in one call: clrt's RayCaster.first_hit, which gives a record a ray, and embreex's cheapest call, on all cores, "
+        "which gives a number."
+    )
+    if "rays_that_differ" in incoherent:
+        note += f" Rays for which they name another triangle: {incoherent['rays_that_differ']:,}."
+    return Table("Incoherent rays, against embreex", ["scene", "triangles", "rays", "clrt, M/s", "embreex, M/s", "ratio"], [row], note=note)
 
 
 def ladder_table(rows: list[dict[str, Any]]) -> Table:
