@@ -70,16 +70,8 @@ HOT void normalmap_tilt(const Geometry *geometry, global const Material *materia
     Geometry seen = *geometry;
     lane_int found[LANES], slot[LANES], material[LANES];
     real where[3 * LANES], normal[3 * LANES];
-    store_lanes(hit->found, found);
-    for (int k = 0; k < LANES; k++) {
-        slot[k] = hit->slot[k];
-        material[k] = hit->material[k];
-    }
-    for (int a = 0; a < 3; a++) {
-        store_lanes(hit->point[a], where + a * LANES);
-        store_lanes(hit->normal[a], normal + a * LANES);
-    }
-    //@ texture_where
+    texture_places(geometry, rays, hit, found, slot, material, where);
+    for (int a = 0; a < 3; a++) store_lanes(hit->normal[a], normal + a * LANES);
     //@ normalmap_where
     normalmap_lanes(&seen, materials, textures, texels, texel_values, corner_uvs, found, slot, material, where, normal);
     for (int a = 0; a < 3; a++) hit->normal[a] = load_lanes(normal + a * LANES);

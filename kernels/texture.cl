@@ -1,5 +1,5 @@
-// Provides: texture_color: the colour of a picture at its coordinates; texture_coordinates: those of a point on a primitive.
-// Needs: geometry.cl, structs.  Reads: nothing.
+// Provides: texture_color: the colour of a picture at its coordinates; texture_coordinates: those of a point on a primitive; texture_places: of hits.
+// Needs: geometry.cl, hit.cl, structs.  Reads: nothing.
 //
 // Coordinates are computed in float64 from the given corners and the hit point, which is off by its own error alone: a coordinate repeated a
 // thousand times keeps its digits. Colours are decoded before they are mixed.
@@ -77,4 +77,16 @@ HOT void texture_on_triangle(const Geometry *geometry, global const double *corn
 HOT void texture_coordinates(const Geometry *geometry, global const double *corner_uvs, int slot, const double *point, double *uv) {
     if (slot < geometry->slot_count) texture_on_triangle(geometry, corner_uvs, slot, point, uv);
     //@ texture_place
+}
+
+// What lanes ask pictures by: which hits there are, their slots and materials, LANES of each; their points, three times LANES.
+HOT void texture_places(const Geometry *geometry, const Rays *rays, const Hit *hit, lane_int *found, lane_int *slot, lane_int *material,
+                        real *where) {
+    store_lanes(hit->found, found);
+    for (int k = 0; k < LANES; k++) {
+        slot[k] = hit->slot[k];
+        material[k] = hit->material[k];
+    }
+    for (int a = 0; a < 3; a++) store_lanes(hit->point[a], where + a * LANES);
+    //@ texture_where
 }

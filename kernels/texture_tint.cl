@@ -26,13 +26,7 @@ HOT void texture_tints(const Geometry *geometry, global const Material *material
     const Geometry seen = *geometry;
     lane_int found[LANES], slot[LANES], material[LANES];
     real where[3 * LANES], color[3 * LANES];
-    store_lanes(hit->found, found);
-    for (int k = 0; k < LANES; k++) {
-        slot[k] = hit->slot[k];
-        material[k] = hit->material[k];
-    }
-    for (int a = 0; a < 3; a++) store_lanes(hit->point[a], where + a * LANES);
-    //@ texture_where
+    texture_places(geometry, rays, hit, found, slot, material, where);
     texture_lanes(&seen, materials, textures, texels, texel_values, corner_uvs, found, slot, material, where, color);
     for (int a = 0; a < 3; a++) tint[a] = load_lanes(color + a * LANES);
 }

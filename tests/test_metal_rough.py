@@ -192,3 +192,24 @@ def test_picture_of_emission_multiplies_what_is_seen_of_it(device: Device) -> No
     np.testing.assert_allclose(clrt.render(mapped).pixels[0, 0], [0.4, 1.2, 4.0], rtol=1e-6)
     behind = replace(mapped, camera=replace(mapped.camera, corners=-mapped.camera.corners))
     np.testing.assert_allclose(clrt.render(behind).pixels[0, 0], [0.2, 0.6, 2.0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("picture", ["metal_rough_map", "emission_map"])
+def test_pictures_lie_on_an_instance_as_on_the_object(picture: str, device: Device) -> None:
+    """A picture of four texels on an object far from where its instance stands: as if the triangles stood there themselves."""
+    head = "E 0 0 -3\nV 0 0 1\nF 60\nR 32 32\nsamples 1\nL 2 3 -4\nM 1 1 1 0 0 0 1 0\nmaterial metallic=1\n"
+    wall = "T {0} -1 0 {1} -1 0 {1} 1 0\nT {0} -1 0 {1} 1 0 {0} 1 0\n"
+    texels = np.array([[(0, 200, 255, 255), (255, 30, 10, 255)], [(80, 120, 90, 255), (160, 255, 0, 255)]], np.uint8)
+
+    def pixels(text: str) -> np.ndarray:
+        scene = parse_scene(head + text)
+        uvs = np.array([[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]], np.float64)
+        glow = {"emission": (1.0, 1.0, 1.0)} if picture == "emission_map" else {}
+        materials = tuple(replace(m, roughness=1.0, **{picture: 0}, **glow) for m in scene.materials)
+        objects = tuple(replace(o, uvs=uvs) for o in scene.objects)
+        textures = (Texture(Picture(texels), linear=False, srgb=False),)
+        return clrt.render(replace(scene, objects=objects, materials=materials, textures=textures)).pixels
+
+    placed = pixels("object wall hidden=yes\n" + wall.format(49.25, 51.25) + "O\ninstance wall -50 0 0\n")
+    np.testing.assert_allclose(placed, pixels(wall.format(-0.75, 1.25) + "O\n"), rtol=1e-5, atol=1e-6)
+    assert placed.std() > 0.05
