@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import random
 import re
 from collections.abc import Iterable
@@ -48,9 +49,13 @@ def _needs(part: Feature | Joint) -> set[str]:
 
 
 def mixed_sets(count: int) -> list[Features]:
-    """`count` sets of about half of all features, seeded."""
+    """`count` sets of about half of all features, seeded; the last has the pairs, too, that meet in none of them."""
     numbers = random.Random(20261122)
-    return [with_needs(name for name in NAMES if numbers.random() < 0.5) for _ in range(count)]
+    chosen = [{name for name in NAMES if numbers.random() < 0.5} for _ in range(count)]
+    for pair in itertools.combinations(NAMES, 2):
+        if not any(names.issuperset(pair) for names in chosen):
+            chosen[-1].update(pair)
+    return [with_needs(names) for names in chosen]
 
 
 _FUNCTION = re.compile(r"^(?:HOT|static|kernel|inline)\b[^;{}()]*?(?:__attribute__\(\(\w+\)\)[^;{}()]*?)?\b(\w+)\(", re.M)
