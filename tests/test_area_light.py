@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from ztest import device_batches
 
 import clrt
 from clrt.errors import SceneError
@@ -14,7 +15,6 @@ from clrt.precision import RUNGS
 from clrt.scene.build import parse_scene
 from clrt.scene.emitters import emitters_of
 from clrt.scene.model import FloatArray, Scene
-from ztest import device_batches
 
 FLOOR = "M 0.5 0.6 0.7  0 1 0 1 0\nT -900 0 -900  900 0 -900  900 0 900\nT -900 0 -900  900 0 900  -900 0 900\n"
 VIEW = "E 0 2 -3\nV 0 -2 3\nF 0.5\nR 8 8\n"
@@ -41,7 +41,7 @@ def polygon_factor(polygon: FloatArray, point: FloatArray, normal: FloatArray) -
 
 
 def close(scene: Scene, expected: FloatArray, samples: int = 64, seeds: int = 6) -> None:
-    """The picture's mean is within 4 standard errors, and each pixel within 6."""
+    """The picture's mean is within 5 standard errors, and each pixel within 12 of the largest: six seeds tell them roughly."""
     batches = device_batches(scene, samples, range(seeds))
     mean, error = batches.mean(0), batches.std(0, ddof=1) / np.sqrt(seeds)
     assert np.abs(mean - expected).max() < 12.0 * error.max() + 1e-5
@@ -63,8 +63,9 @@ def test_square_light_over_a_floor_is_lamberts_formula(precision: str) -> None:
 
 def test_back_of_a_light_shines_at_a_grazing_ceiling() -> None:
     """The ceiling a little above the light is lit by its upper side, without the light shadowing itself."""
-    scene = parse_scene("E 0 1 -3\nV 0 0.46 1\nF 4\nR 8 8\n" + LAMP + "T -0.3 1.9 -0.3  0.3 1.9 -0.3  0.3 1.9 0.3\nT -0.3 1.9 -0.3  0.3 1.9 0.3  -0.3 1.9 0.3\n"
-                        + "M 1 1 1  0 1 0 1 0\nT -9 2 -9  9 2 -9  9 2 9\nT -9 2 -9  9 2 9  -9 2 9\n")  # fmt: skip
+    light = LAMP + "T -0.3 1.9 -0.3  0.3 1.9 -0.3  0.3 1.9 0.3\nT -0.3 1.9 -0.3  0.3 1.9 0.3  -0.3 1.9 0.3\n"
+    ceiling = "M 1 1 1  0 1 0 1 0\nT -9 2 -9  9 2 -9  9 2 9\nT -9 2 -9  9 2 9  -9 2 9\n"
+    scene = parse_scene("E 0 1 -3\nV 0 0.46 1\nF 4\nR 8 8\n" + light + ceiling)
     d, eye = scene.camera.directions(), scene.camera.eye
     points = eye + (2.0 - eye[1]) / d[..., 1:2] * d
     assert (points[..., 2] < -0.35).all(), "the pixels see the ceiling beside the light"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from test_indirect import LAMPS, ROOM
+from ztest import assert_same, device_batches
 
 import clrt
 from clrt.errors import SceneError
@@ -12,8 +14,6 @@ from clrt.precision import RUNGS
 from clrt.reference.paths import render_paths
 from clrt.scene.build import parse_scene
 from clrt.scene.scale import scaled
-from test_indirect import LAMPS, ROOM
-from ztest import assert_same, device_batches
 
 WALL = "M 1 1 1  0 0 0 1 0\narealight 1 0.5 0.25\nT -9 -9 {0}  9 -9 {0}  9 9 {0}\nT -9 -9 {0}  9 9 {0}  -9 9 {0}\n"
 BLACK = "fog {} red=0 green=0 blue=0\n"
@@ -42,8 +42,8 @@ def test_light_is_weakened_on_its_way_to_a_surface() -> None:
 def test_airlight_of_a_lamp_is_its_integral(asymmetry: float) -> None:
     """A ray along x at the distance 1 from a point light of colour 1: the integral of s exp(-s x) p(cos) pi exp(-s d), by quadrature."""
     density, ahead = 0.3, 2.0
-    text = f"E -{ahead} 0 0\nV 1 0 0\nF 0.01\nR 4 4\nL 0 1 0\nM 1 1 1 0 0 0 1 0\nT 90 90 -99  90 90 -98  90 91 -98\nfog {density} asymmetry={asymmetry}\n"
-    batches = device_batches(parse_scene(text), 256, range(12)).mean((1, 2, 3))
+    text = f"E -{ahead} 0 0\nV 1 0 0\nF 0.01\nR 4 4\nL 0 1 0\nM 1 1 1 0 0 0 1 0\nT 90 90 -99  90 90 -98  90 91 -98\n"
+    batches = device_batches(parse_scene(text + f"fog {density} asymmetry={asymmetry}\n"), 256, range(12)).mean((1, 2, 3))
     nodes, weights = np.polynomial.legendre.leggauss(400)
     x = 30.0 * (nodes + 1.0)
     way = np.stack([ahead - x, np.ones_like(x)])

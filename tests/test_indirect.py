@@ -7,16 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ztest import assert_same, device_batches
 
 import clrt
 from clrt.errors import SceneError
 from clrt.features import Features
 from clrt.precision import RUNGS
+from clrt.reference.paths import render_paths
 from clrt.scene.build import parse_scene
 from clrt.scene.model import Indirect
-from ztest import assert_same, device_batches
-
-from clrt.reference.paths import render_paths
 
 VIEW = "E 0.1 0.2 -0.3\nV 0.3 0.2 1\nF 60\nR 8 8\n"
 
@@ -50,7 +49,10 @@ def test_furnace_is_emission_over_what_is_lost(walls: str) -> None:
 @pytest.mark.parametrize("precision", RUNGS)
 @pytest.mark.parametrize("depth", [0, 1, 2, 3])
 def test_depth_ends_the_series(precision: str, depth: int) -> None:
-    """Light of at most depth + 1 surfaces: 1 + 1/2 + ... + 2^-(depth + 1); the last by light samples. Without depth nothing scatters: Ka counts."""
+    """Light of at most depth + 1 surfaces: 1 + 1/2 + ... + 2^-(depth + 1); the last by light samples.
+
+    Without depth nothing scatters: Ka counts.
+    """
     scene = parse_scene(furnace("0 1 0 1", WALLS["ball"], depth))
     picture = np.mean([clrt.render(scene, samples=16, seed=s, precision=precision).pixels.mean() for s in range(4)])
     assert abs(picture - sum(0.5**k for k in range(depth + 2))) < 2e-3

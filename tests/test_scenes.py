@@ -18,8 +18,8 @@ SCENES = Path(__file__).parents[1] / "scenes"
 ALL = sorted(SCENES.rglob("*.txt"))
 EXPECTED = re.compile(r"^# pixel \((\d+),(\d+)\) is (\S+) (\S+) (\S+)$", re.MULTILINE)
 EFFECTS = (
-    "absorb", "corners", "falloff", "fresnel", "glass", "include", "instance", "mesh", "mirror", "normalmap", "opacity", "phong", "shadow", "smooth",
-    "sphere", "spot", "sun", "texture",
+    "absorb", "corners", "falloff", "fresnel", "glass", "include", "instance", "mesh", "mirror", "normalmap", "opacity", "phong", "shadow",
+    "smooth", "sphere", "spot", "sun", "texture",
 )  # fmt: skip
 
 #: the comments have six decimals

@@ -45,7 +45,7 @@ class Options:
 
 @click.command("render", short_help="Render a scene; the word is never needed.")
 @click.argument("scene", type=kinds.file, required=False)
-@click.option("-o", "--out", type=kinds.file, metavar="FILE", help="Picture: .png, .ppm or .exr.  [default: SCENE.png in the current folder]")
+@click.option("-o", "--out", type=kinds.file, metavar="FILE", help="Picture: .png, .ppm, .exr.  [default: SCENE.png in the current folder]")
 @click.option("--size", type=kinds.size, metavar="WxH", help="Width and height in pixels, instead of the scene's.")
 @click.option("--tree", type=click.Choice(["sah", "median"]), default="sah", show_default=True, help="How the kd-trees are split.")
 @click.option("--device", metavar="NAME", help="Part of the name of an OpenCL device; `clrt devices` lists them.")

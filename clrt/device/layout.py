@@ -86,14 +86,16 @@ def emitter(real: type) -> np.dtype[np.void]:
 
 
 def environment_row(real: type) -> np.dtype[np.void]:
-    """A row of the environment: cosines of its edges, the chance of a cell per word of its own, its first word, its cells up to the last lit."""
+    """A row of the environment: cosines of its edges, the chance of a cell per word of its own, its first word, its cells up to
+    the last lit.
+    """
     return struct_dtype([("top", np.float64), ("bottom", np.float64), ("density", real), ("begin", np.int32), ("lit", np.int32)])
 
 
 def placement(real: type) -> np.dtype[np.void]:
     """An object seen through a transform (placed.cl): rows of it; the greatest that it stretches a vector by; which object; its medium."""
-    return struct_dtype([("object_from_world", np.float64, (12,)), ("motion", np.float64, (3,)), ("stretch", np.float64), ("object", np.int32),
-                         ("medium", np.int32)])  # fmt: skip
+    return struct_dtype([("object_from_world", np.float64, (12,)), ("motion", np.float64, (3,)), ("stretch", np.float64),
+                         ("object", np.int32), ("medium", np.int32)])  # fmt: skip
 
 
 def sphere(real: type) -> np.dtype[np.void]:
