@@ -1,0 +1,1 @@
+"""What accuracy costs in time: measured into study.json, shown as study.md and study.html."""

@@ -1,0 +1,150 @@
+"""Bars of a study: rungs, effects, trees, phases. Each returns the caption that says what is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from clrt.study.report_plots import BLUE, GREEN, GREY, INK, ORANGE, NothingToDraw
+from clrt.study.report_series import Rows, Series, rows_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_LONGEST_NAME = 28  #: characters of a name beside a bar
+_ROOM = 1.45  #: length of the axis over that of the longest bar: room for the numbers at their ends
+
+
+def draw_precision(figure: Figure, content: Mapping[str, Any]) -> str:
+    """Left the time over that of `fast`, right what is still wrong."""
+    rows = rows_of(content)
+    ratio = Series.of(rows, "ratio_to_fast")
+    wrong_key = next((key for key in ("wrong_primitives", "picture_error") if Series.of(rows, key).known.any()), None)
+    if not ratio.known.any():
+        raise NothingToDraw
+    panels = figure.subplots(1, 2 if wrong_key else 1, squeeze=False, sharey=True)[0]
+    names = _names(rows, "rung")
+    _bars(panels[0], names, ratio, BLUE, "time over fast")
+    panels[0].axvline(1.0, color=INK, linewidth=0.8, linestyle=":")
+    if wrong_key:
+        _bars(panels[1], names, Series.of(rows, wrong_key), ORANGE, wrong_key.replace("_", " "))
+    return _precision_caption(names, ratio)
+
+
+def _precision_caption(names: list[str], ratio: Series) -> str:
+    """A rung is said to differ from fast only where its interval leaves 1 out."""
+    known = {name: number for name, number in zip(names, ratio.numbers, strict=True) if number and number.has_interval}
+    if not known:
+        return "Trace time over that of fast."
+    dearer = [name for name, number in known.items() if number.low > 1.0]
+    cheaper = [name for name, number in known.items() if number.high < 1.0]
+    words = [f"Trace time over that of fast, with 95% intervals: {', '.join(f'{name} {number}' for name, number in known.items())}."]
+    words += [f"Dearer than fast: {', '.join(dearer)}."] if dearer else []
+    words += [f"Cheaper than fast: {', '.join(cheaper)}."] if cheaper else []
+    if same := [name for name in known if name not in (*dearer, *cheaper)]:
+        words.append(f"Not to be told from fast in time: {', '.join(same)}.")
+    return " ".join(words)
+
+
+def draw_effects(figure: Figure, content: Mapping[str, Any]) -> str:
+    """Left the time that each effect takes, right the error of the picture without it; the dearest on top."""
+    rows = rows_of(content)
+    cost = Series.of(rows, "cost")
+    error_key = next((key for key in ("error", "max_difference") if Series.of(rows, key).known.any()), None)
+    if not cost.known.any():
+        raise NothingToDraw
+    order = np.argsort(-np.where(cost.known, cost.medians, -np.inf), kind="stable")
+    rows = [rows[i] for i in order]
+    names = _names(rows, "effect")
+    panels = figure.subplots(1, 2 if error_key else 1, squeeze=False, sharey=True)[0]
+    cost = Series.of(rows, "cost")
+    _bars(panels[0], names, cost, BLUE, "time it takes")
+    if error_key:
+        what = "error" if error_key == "error" else "difference"
+        _bars(panels[1], names, Series.of(rows, error_key), ORANGE, f"{what} without it")
+    words = [f"The dearest effect is {names[0]}, {cost.numbers[0]}."]
+    if free := [name for name, n in zip(names, cost.numbers, strict=True) if n and n.has_interval and n.low <= 0.0 <= n.high]:
+        words.append(f"Not to be told from nothing in time: {', '.join(free)}.")
+    return " ".join(words)
+
+
+def draw_trees(figure: Figure, content: Mapping[str, Any]) -> str:
+    """One panel a quantity, one bar a tree; a panel where they lie far apart is a logarithmic one with points."""
+    rows = rows_of(content)
+    wanted = {"build": "build", "tests_per_ray": "tests a ray", "trace": "trace", "nodes": "nodes"}
+    series = {key: Series.of(rows, key) for key in wanted}
+    series = {key: value for key, value in series.items() if value.known.any()}
+    if len(rows) < 2 or not series:
+        raise NothingToDraw
+    names = _names(rows, "tree")
+    panels = figure.subplots(2, 2, squeeze=False, sharey=True).ravel()
+    for axes, (key, values) in zip(panels, series.items(), strict=False):
+        _bars(axes, names, values, GREEN if key == "nodes" else BLUE, wanted[key])
+    for axes in panels[len(series):]:
+        axes.remove()
+    words = [_compare(names, series[key], what) for key, what in (("tests_per_ray", "tests a ray"), ("trace", "trace")) if key in series]
+    return " ".join(["Build time, tests a ray, trace time and size, by tree.", *(word for word in words if word)])
+
+
+def _compare(names: list[str], values: Series, what: str) -> str:
+    known = [(n, name) for n, name in zip(values.numbers, names, strict=True) if n]
+    if len(known) < 2:
+        return ""
+    (best, best_name), *_ = sorted(known, key=lambda pair: pair[0].median)
+    others = ", ".join(f"{name} {n.without_unit()}" for n, name in known if name != best_name)
+    return f"Least {what}: {best_name}, {best.without_unit()}; {others}."
+
+
+def draw_phases(figure: Figure, content: Mapping[str, Any]) -> str:
+    """One bar a phase in the order in which they happen."""
+    rows = rows_of(content)
+    seconds = Series.of(rows, "seconds")
+    total = float(np.nansum(seconds.medians))
+    if not seconds.known.any() or total <= 0.0:
+        raise NothingToDraw
+    names = _names(rows, "phase")
+    _bars(figure.subplots(), names, seconds, BLUE, "time")
+    largest = int(np.nanargmax(seconds.medians))
+    return f"Phases from first to last. The longest is {names[largest]}: {seconds.numbers[largest]}."
+
+
+def _names(rows: Rows, key: str) -> list[str]:
+    texts = [str(row.get(key, "?")) for row in rows]
+    return [text if len(text) <= _LONGEST_NAME else text[: _LONGEST_NAME - 1] + "…" for text in texts]
+
+
+def _bars(axes: Axes, names: list[str], values: Series, colour: str, title: str) -> None:
+    """Lying bars, the first on top, with whiskers for intervals and the median written at the end of each."""
+    from matplotlib.ticker import FuncFormatter, MaxNLocator
+
+    shown, places = values.known, np.arange(len(names))
+    factor, unit = values.axis
+    medians, spread = values.medians / factor, shown & (values.highs > values.lows)
+    axes.barh(places[shown], medians[shown], height=0.62, color=colour)
+    axes.errorbar(medians[spread], places[spread], xerr=values.whiskers(spread, 1.0 / factor), fmt="none", ecolor=INK, elinewidth=1.2)
+    axes.set_yticks(places, [_safe(name) for name in names])
+    axes.set_ylim(len(names) - 0.4, -0.6)
+    axes.set_title(title if unit in ("", *title.split()) else f"{title}, {unit}", loc="left")
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.6g}"))
+    axes.tick_params(axis="y", length=0)
+    axes.grid(True, axis="x")
+    top, bottom = max(float(values.highs[shown].max()), 0.0) / factor, min(float(values.lows[shown].min()), 0.0) / factor
+    axes.set_xlim(bottom * 1.05, top * _ROOM if top > 0.0 else 1.0 if bottom == 0.0 else -bottom * 0.5)
+    _numbers(axes, values, factor)
+
+
+def _numbers(axes: Axes, values: Series, factor: float) -> None:
+    for place, number in enumerate(values.numbers):
+        end = 0.0 if number is None else max(number.median, number.high, 0.0) / factor
+        text = "not measured" if number is None else number.without_unit().short()
+        look: dict[str, Any] = {"fontsize": 9, "color": GREY if number is None else INK}
+        axes.annotate(text, (end, place), xytext=(5, 0), textcoords="offset points", va="center", **look)
+
+
+def _safe(text: str) -> str:
+    """Dollar signs would start a formula."""
+    return text.replace("$", r"\$")
