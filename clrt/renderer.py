@@ -9,6 +9,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from clrt.adaptive import request as accuracy
+from clrt.adaptive.replicates import Replicates
+from clrt.adaptive.request import Foretell, Request
 from clrt.device import program
 from clrt.device.context import Device, open_device
 from clrt.device.pack import pack, tree_origins
@@ -60,21 +63,34 @@ def render(
     without: Iterable[str] = (),
     progress: Progress | None = None,
     dump_kernel: Path | None = None,
+    error: float | None = None,
+    within: float | None = None,
+    standard_error: bool = False,
+    deadline: float | None = None,
+    foretell: Foretell | None = None,
 ) -> Image:
     """The picture of `scene`, with the figures of the run in its `stats`.
 
     size : (width, height) in pixels; depth : reflections and refractions in a row, 0 to 128; count : run a second, counting pass
     samples : rays through each pixel, instead of the scene's own; seed : of all random numbers, 0 to 2^32 - 1
     without : names of effects to leave out, with what needs them; a RuntimeWarning tells of one that the scene does not call for
-    dump_kernel : where to write the OpenCL program. Raises DeviceError, LimitError, ClrtError, OSError.
+    dump_kernel : where to write the OpenCL program
+    error, within : samples where they bring most until the relative error is below `error`, or `within` seconds from the call on have gone
+    standard_error : the picture has one, also with `samples`, which are split over independent sequences then
+    deadline : time.perf_counter() at which `within` ends, where it counts from another moment; foretell : called with the forecast
+    Raises DeviceError, LimitError, ClrtError, OSError.
     """
     start = time.perf_counter()
+    request = Request.of(error, within, samples, standard_error, deadline)
     tell = progress or (lambda phase, fraction: None)
     names = effect_names(without)
-    scene = with_options(scene, size, depth, samples, seed)
+    scene = with_options(scene, size, depth, request.samples(samples), seed)
     ladder, opened = rung(precision), open_device(device)
     check_picture(opened, scene.camera.width, scene.camera.height)
     features = _features(scene, names)
+    if request:
+        accuracy.check_sampled(features)
+        request.goal(scene.samples)
     prepared = build_trees(scene, tree, tell)
     build_end = time.perf_counter()
     buffers, tracer, source, upload_s = open_tracer(prepared, features, ladder, opened, tell)
@@ -83,8 +99,10 @@ def render(
         with atomic_write(dump_kernel) as file:
             file.write(source.encode())
     before = time.perf_counter()
-    run_rows(tracer, "render", tell)
-    pixels = tracer.picture()
+    outcome, replicates = accuracy.sample(tracer, request, partial(tell, "render"), foretell)
+    if outcome is None:
+        run_rows(tracer, "render", tell)
+    pixels = tracer.picture() if outcome is None else outcome.pixels
     end = time.perf_counter()
     stats = RunStats(
         scene=scene.source, width=scene.camera.width, height=scene.camera.height, tree=tree, device=opened.info.name,
@@ -94,10 +112,12 @@ def render(
     )  # fmt: skip
     if tracer.stages is not None:
         stats.decided = tracer.stages.read()
+    if outcome is not None:
+        accuracy.note(stats, request, outcome)
     if count:
-        _count(prepared, buffers, stats, tell)
+        _count(prepared, buffers, stats, tell, replicates)
         stats.count_s = time.perf_counter() - end
-    return Image(pixels, stats)
+    return Image(pixels, stats, None if outcome is None else outcome.standard_error)
 
 
 def _features(scene: Scene, without: tuple[str, ...]) -> Features:
@@ -236,15 +256,18 @@ def _object_stats(prepared: Prepared) -> list[ObjectStats]:
     ]  # fmt: skip
 
 
-def _count(prepared: Prepared, buffers: Buffers, stats: RunStats, tell: Progress) -> None:
-    """The same picture again by the counting build: rays by kind, tests by object."""
+def _count(prepared: Prepared, buffers: Buffers, stats: RunStats, tell: Progress, replicates: Replicates | None) -> None:
+    """The same picture again by the counting build, by the same launches if it was made of replicates: rays by kind, tests by object."""
     precision, device = buffers.precision, buffers.device
     lanes = precision.lanes(device.info.lanes)
     shape = program_shape(prepared, buffers.features, buffers.shared_lights)
     tracer = Tracer(
         buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True
     )
-    run_rows(tracer, "count", tell)
+    if replicates is None:
+        run_rows(tracer, "count", tell)
+    else:
+        Replicates(tracer).replay(replicates.launches)
     kinds = buffers.features.ray_kinds
     stats.ray_counts = {kind: int(n) for kind, n in zip(kinds, tracer.counts, strict=False)}
     rays = max(1, sum(stats.ray_counts.values()))

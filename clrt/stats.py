@@ -48,7 +48,9 @@ class RunStats:
     total_s : from the start of the command to the written picture, without `count_s`; from Python, from `render` to the picture
     ray_counts : rays traced by kind (see RAY_KINDS), None unless counted
     decided : lanes that the rung "exact" decided in float64 and in exact arithmetic; None for other rungs
-    samples, seed : rays through each pixel; the seed of all random numbers
+    samples, seed : rays through each pixel, the most where they are not the same everywhere; the seed of all random numbers
+    samples_per_pixel : their mean, None where they are the same everywhere
+    accuracy : what was asked of the picture's error, foretold and reached (README, "Figures of a run"); None where no error is known
     effects : names of what the scene calls for, in the order of their kernels, but for what was left out
     without : names of effects that were to be left out
     """
@@ -61,6 +63,8 @@ class RunStats:
     precision: str = ""
     samples: int = 1
     seed: int = 0
+    samples_per_pixel: float | None = None
+    accuracy: dict[str, Any] | None = None
     effects: list[str] = field(default_factory=list)
     without: list[str] = field(default_factory=list)
     objects: list[ObjectStats] = field(default_factory=list)
@@ -104,7 +108,9 @@ class RunStats:
     @property
     def primary_rays(self) -> int:
         """Rays from the eye: `samples` a pixel, known without counting."""
-        return self.ray_counts.get("primary", 0) if self.ray_counts is not None else self.width * self.height * self.samples
+        if self.ray_counts is not None:
+            return self.ray_counts.get("primary", 0)
+        return round(self.width * self.height * (self.samples if self.samples_per_pixel is None else self.samples_per_pixel))
 
     @property
     def rays(self) -> int | None:
@@ -135,6 +141,7 @@ class RunStats:
             "effects": list(self.effects),
             "without": list(self.without),
             "bias": self.bias,
+            "accuracy": self.accuracy,
             **{name: round(getattr(self, name), 6) for name in _TIMES},
             "triangles": self.triangles,
             "nodes": self.nodes,

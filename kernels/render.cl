@@ -72,7 +72,8 @@ void render(global const Frame *frame, global const int2 *nodes, global const in
             global const Surface *surfaces, global const Material *materials, int first_row, int end_row, global float *film
             //@ parameters
 ) {
-    const int column = get_global_id(0) * PACKET_WIDTH, row = first_row + get_global_id(1) * PACKET_HEIGHT;
+    int column = get_global_id(0) * PACKET_WIDTH, row = first_row + get_global_id(1) * PACKET_HEIGHT;
+    //@ packet
     if (column >= frame->width || row >= end_row) return;
     render_packet(column, row, frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces, materials, end_row, film
                   //@ arguments

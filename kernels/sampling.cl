@@ -1,8 +1,9 @@
 // Provides: sampling_camera, sampling_store: one sample of each pixel, and the mean of those so far.
-// Needs: sampler.cl, lanes.cl, rays.cl, structs.  Reads: PACKET_WIDTH, PACKET_HEIGHT (their product is LANES).
+// Needs: sampler.cl, lanes.cl, rays.cl, structs.  Reads: PACKET_WIDTH, PACKET_HEIGHT (their product is LANES), TILE_WIDTH, TILE_HEIGHT.
 //
 // `sample_range` holds the number of the sample and how many were added up before. Sums are taken in float64, sample after sample, so
 // they do not depend on how the picture is cut into launches; after n additions the relative error is below n 2^-53.
+// Then comes the number of tiles, and column and row of the first pixel of each; none: rows as they are launched.
 
 // The rays of camera_rays, moved from the pixel's centre and the eye by what effects add. `extent` is as in rays_prepare.
 HOT void sampling_camera(global const Frame *frame, int column, int row, uint sample, uint seed, Rays *rays) {
@@ -46,4 +47,13 @@ static inline void sampling_store(global const int *sample_range, global double 
 //@end
 //@hook store
         for (int a = 0; a < 3; a++) sampling_store(sample_range, sample_sums, 3 * ((size_t)y * frame->width + x) + a, out[a][k], film);
+//@end
+//@hook packet
+    if (sample_range[2] > 0) {
+        const int across = TILE_WIDTH / PACKET_WIDTH, packets = across * (TILE_HEIGHT / PACKET_HEIGHT);
+        const int number = get_global_id(1) * get_global_size(0) + get_global_id(0), tile = number / packets, place = number % packets;
+        if (tile >= sample_range[2]) return;
+        column = sample_range[3 + 2 * tile] + place % across * PACKET_WIDTH;
+        row = sample_range[4 + 2 * tile] + place / across * PACKET_HEIGHT;
+    }
 //@end

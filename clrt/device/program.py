@@ -38,6 +38,7 @@ _ENTRIES = {
     "cast": ((), ("scene.cl",), ("after.cl", "prepare.cl", "cast.cl", "cast_finish.cl")),
 }
 PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a packet, width and height
+TILE = (16, 8)  #: pixels of a tile, width and height: whole packets of any size
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
 MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
@@ -128,6 +129,8 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     values: dict[str, int] = {"REAL_BITS": precision.bits, "LANES": lanes, "PACKET_WIDTH": width, "PACKET_HEIGHT": height,
                               "STACK_SIZE": shape.stack}  # fmt: skip
     names = {f.name for f in features.active}
+    if "sampling" in names:
+        values |= {"TILE_WIDTH": TILE[0], "TILE_HEIGHT": TILE[1]}
     if "shadows" in names:
         values["SHADOW_SHARED_ORIGIN"] = int(shape.shared_lights)
     if "bounce" in names:

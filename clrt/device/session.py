@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -158,7 +159,8 @@ class Tracer:
             surfaces,
             materials,
         )
-        self._after = (self.film, *(buffers.effects[name] for f in buffers.features.active for name, _ in f.parameters))
+        self._effects = [name for f in buffers.features.active for name, _ in f.parameters]
+        self._after = (self.film, *(buffers.effects[name] for name in self._effects))
         if counting:
             self._after += (self._counter_buffer,)
         self.stages = StageCounter(buffers) if buffers.precision.decides_in_stages else None
@@ -169,7 +171,17 @@ class Tracer:
         """The next rows are those of this sample, which is added to the ones before it. For scenes that are sampled."""
         import pyopencl as cl
 
-        cl.enqueue_copy(self.buffers.device.queue, self.buffers.effects["sample_range"], np.array([sample, sample], np.int32))
+        cl.enqueue_copy(self.buffers.device.queue, self.buffers.effects["sample_range"], np.array([sample, sample, 0], np.int32))
+
+    def run_tiles(self, frame: Any, effects: Mapping[str, Any], tiles: int) -> None:
+        """Enqueues one sample of tiles, without waiting; `frame` and `effects` (name -> buffer) are taken in place of the tracer's own."""
+        packet_width, packet_height = program.PACKETS[self.lanes]
+        packets = tiles * (program.TILE[0] // packet_width) * (program.TILE[1] // packet_height)
+        size = program.LOCAL_SIZE[0], _multiple(-(-packets // program.LOCAL_SIZE[0]), program.LOCAL_SIZE[1])
+        after = (self.film, *(effects.get(name, own) for name, own in zip(self._effects, self._after[1:], strict=False)))
+        rows = np.int32(0), np.int32(self.height)
+        queue = self.buffers.device.queue
+        self.kernel(queue, size, program.LOCAL_SIZE, frame, *self._before[1:], *rows, *after, *self._after[len(after) :])
 
     def warm_up(self) -> None:
         """Launches over no rows: PoCL compiles for a local size at its first launch, which belongs to compiling."""

@@ -27,10 +27,12 @@ class Image:
 
     pixels : (height, width, 3) float32, linear red, green, blue, not clamped; row 0 at the top
     stats : the figures of the run that made it, or None
+    standard_error : (height, width, 3) float32, of each number of `pixels`, or None where it is not known
     """
 
-    def __init__(self, pixels: ArrayLike, stats: RunStats | None = None) -> None:
+    def __init__(self, pixels: ArrayLike, stats: RunStats | None = None, standard_error: NDArray[np.float32] | None = None) -> None:
         """Raises ValueError where `pixels` is not (height, width, 3) with at least one pixel."""
+        self.standard_error = standard_error
         self.pixels: NDArray[np.float32] = np.asarray(pixels, dtype=np.float32)
         self.stats = stats
         if self.pixels.ndim != 3 or self.pixels.shape[2] != 3 or self.pixels.size == 0:

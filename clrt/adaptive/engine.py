@@ -1,0 +1,214 @@
+"""Renders to an error or within a time: a pilot over all of the picture, then tiles where a sample brings most."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.adaptive.intervals import Interval
+from clrt.adaptive.ledger import Ledger
+from clrt.adaptive.moments import flat, moments
+from clrt.adaptive.predict import Forecast, Outlook, as_told
+from clrt.adaptive.replicates import REPLICATES, Replicates
+from clrt.adaptive.schedule import Walk
+
+IntArray = NDArray[np.int64]
+FloatArray = NDArray[np.float64]
+
+PILOT = 0.05  #: of the whole that is spent when the forecast is made
+MOST_SAMPLES = 1 << 20  #: of a pixel
+_CHUNK_S = 0.1  #: launches are to take about this long, so that Ctrl-C and progress come between them
+_FIRST_TILES = 32  #: in the first launch, whose speed is not known yet
+_READ_TILES = 64  #: looked at in one go: their numbers fit a processor's cache
+_FINISH_S = 2e-7  #: a pixel, to make a picture of the tiles at the end
+
+Tell = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What to sample for. All may be None but one; of error and deadline the first that is reached ends the render.
+
+    error : relative error of the picture, at 95% confidence; deadline : time.perf_counter() at which the picture is to be there
+    samples : of a pixel, the same everywhere
+    """
+
+    error: float | None = None
+    deadline: float | None = None
+    samples: int | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """pixels, standard_error : (h, w, 3) float32; error : of the picture, relative; samples : least, mean and most of a pixel.
+
+    forecast : what was foretold, None where the render was over before; met : the error asked for was reached (or none was asked for)
+    """
+
+    pixels: NDArray[np.float32]
+    standard_error: NDArray[np.float32]
+    error: Interval
+    samples: tuple[int, float, int]
+    forecast: Forecast | None
+    met: bool
+
+
+class Engine:
+    """One render, to be run once."""
+
+    def __init__(
+        self, replicates: Replicates, goal: Goal, tell: Tell, foretell: Callable[[Forecast], None], contrast: float | None
+    ) -> None:
+        """contrast : where only edges are refined, how far neighbouring pixels may differ elsewhere; None: look everywhere."""
+        self.replicates, self.goal, self.tell, self.foretell, self.contrast = replicates, goal, tell, foretell, contrast
+        self.grid = replicates.grid
+        self.start = time.perf_counter()
+        self.cost: FloatArray = np.zeros(self.grid.count)  #: seconds of one sample of a tile, all replicates
+        self.flat: IntArray = np.zeros(0, np.int64)  #: tiles without an edge, that keep one sample
+        self.ledger = Ledger(self.grid, 1 if goal.samples is None else goal.samples // REPLICATES)
+        self.forecast: Forecast | None = None
+
+    @property
+    def spent(self) -> float:
+        return time.perf_counter() - self.start
+
+    def run(self) -> Outcome:
+        """Raises nothing but what launches raise."""
+        everywhere = np.arange(self.grid.count)
+        rest = everywhere if self.contrast is None else self._edges(everywhere, self.contrast)
+        taken = self._pilot(rest)
+        if taken < REPLICATES:
+            return self._short(taken)
+        self.walk = Walk(self.ledger, MOST_SAMPLES // REPLICATES)
+        met = True
+        if self.goal.samples is None:
+            met = self.walk.run(self._extend, self._met) or self.goal.error is None
+        self.tell(1.0)
+        return self._outcome(met)
+
+    def _left(self) -> float:
+        """Seconds until the picture must be made of the tiles."""
+        if self.goal.deadline is None:
+            return np.inf
+        return self.goal.deadline - time.perf_counter() - _FINISH_S * int(self.grid.pixels.sum())
+
+    def _edges(self, tiles: IntArray, contrast: float) -> IntArray:
+        """One sample through each pixel's centre; tiles without an edge keep it. The others are returned."""
+        self.replicates.centre(tiles)
+        picture = self.replicates.means(0, 1)
+        differs = np.zeros(picture.shape[:2], bool)
+        for axis in (0, 1):
+            apart = ~(np.abs(np.diff(picture, axis=axis)) <= contrast * abs(float(picture.mean()))).all(-1)
+            before, behind = ((slice(None, -1), slice(None)), (slice(1, None), slice(None))) if axis == 0 else (
+                (slice(None), slice(None, -1)), (slice(None), slice(1, None)))  # fmt: skip
+            differs[before] |= apart
+            differs[behind] |= apart
+        rows, columns, inside = self.grid.places(tiles)
+        edge = (differs[rows, columns] & inside).any((1, 2))
+        for part in _parts(tiles[~edge], _READ_TILES):
+            rows, columns, inside = self.grid.places(part)
+            self.ledger.put(part, 0, flat(picture[rows, columns], inside))
+        self.flat = tiles[~edge]
+        return np.asarray(tiles[edge])
+
+    def _pilot(self, tiles: IntArray) -> int:
+        """Level 0 of these tiles; how many replicates there was time for."""
+        for i in range(REPLICATES):
+            if i and i * self._left() < self.spent:
+                return i
+            self._pilot_replicate(tiles, i)
+            self.tell(self._fraction(0.02 * (i + 1) / REPLICATES))
+        for part in _parts(tiles, _READ_TILES):
+            self._look(part, 0)
+        return REPLICATES
+
+    def _pilot_replicate(self, tiles: IntArray, i: int) -> None:
+        size, at = _FIRST_TILES, 0
+        while at < len(tiles):
+            part, begin = tiles[at : at + size], time.perf_counter()
+            self.replicates.run(part, 0, self.ledger.first, range(i, i + 1))
+            seconds = time.perf_counter() - begin
+            self.cost[part] += seconds / len(part) / self.ledger.first
+            at += len(part)
+            size = max(8, min(8 * size, int(_CHUNK_S / max(seconds / len(part), 1e-9))))
+
+    def _look(self, tiles: IntArray, level: int) -> None:
+        """Puts what the sums of these tiles say into the ledger."""
+        inside = self.grid.places(tiles)[2]
+        samples = int(self.ledger.samples(level))
+        self.ledger.put(tiles, level, moments(self.replicates.values(tiles, samples), inside))
+
+    def _extend(self, tiles: IntArray) -> bool:
+        """The next level of these tiles; False where there is no time for all."""
+        for level in np.unique(self.ledger.reached[tiles]).tolist():
+            same = tiles[self.ledger.reached[tiles] == level]
+            samples = int(self.ledger.samples(level))
+            while same.size:
+                seconds = np.cumsum(self.cost[same]) * samples
+                part = same[: max(1, int(np.searchsorted(seconds, min(_CHUNK_S, self._left()))))]
+                if float(self.cost[part].sum()) * samples > self._left():
+                    return False
+                begin = time.perf_counter()
+                self.replicates.run(part, samples, 2 * samples)
+                for few in _parts(part, _READ_TILES):
+                    self._look(few, level + 1)
+                self._learn(part, (time.perf_counter() - begin) / samples)
+                same = same[len(part) :]
+                self.tell(self._fraction())
+        return True
+
+    def _learn(self, tiles: IntArray, seconds: float) -> None:
+        """Halfway from what was known of the cost of these tiles to what they took together."""
+        before = float(self.cost[tiles].sum())
+        self.cost[tiles] *= 0.5 * (1.0 + seconds / before) if before > 0.0 else 1.0
+
+    def _met(self, half: int) -> bool:
+        if self.forecast is None:
+            self._foretell()
+        levels = self.walk.levels[half]
+        return self.goal.error is not None and self.ledger.half_error(half, levels).high <= self.goal.error
+
+    def _foretell(self) -> None:
+        """The forecast, as soon as PILOT of the whole is done."""
+        seconds = None if self.goal.deadline is None else self.spent + max(self._left(), 0.0)
+        found = Outlook(self.ledger, self.walk, self.cost, self.spent).forecast(self.goal.error, seconds)
+        if self.spent >= PILOT * found.seconds.value:
+            self.forecast = as_told(found, self.goal.error)
+            self.foretell(self.forecast)
+
+    def _fraction(self, least: float = 0.02) -> float:
+        whole = self.forecast.seconds.value if self.forecast is not None else np.inf
+        return float(min(max(self.spent / max(whole, 1e-9), least), 0.99))
+
+    def _outcome(self, met: bool) -> Outcome:
+        levels = self.walk.swapped
+        pixels, error = self.ledger.picture(levels)
+        return Outcome(pixels, error, self.ledger.error(levels), self._samples(), self.forecast, met)
+
+    def _samples(self) -> tuple[int, float, int]:
+        """Of a pixel that were traced, also those that only decided."""
+        count = self.ledger.samples(self.ledger.reached) * REPLICATES
+        if self.contrast is not None:
+            count = count + 1
+            count[self.flat] = 1
+        return int(count.min()), float((count * self.grid.pixels).sum() / self.grid.pixels.sum()), int(count.max())
+
+    def _short(self, taken: int) -> Outcome:
+        """No time for all replicates: the mean of those there are, with what they tell of the error."""
+        values = np.stack([self.replicates.means(i, self.ledger.first) for i in range(taken)])
+        pixels = values.mean(axis=0)
+        if taken == 1:
+            unknown = np.full(pixels.shape, np.inf, np.float32)
+            return Outcome(pixels.astype(np.float32), unknown, Interval(np.inf, 0.0, np.inf), (1, 1.0, 1), None, self.goal.error is None)
+        variance = values.var(axis=0, ddof=1) / taken
+        value = float(np.sqrt(variance.mean()) / max(abs(float(pixels.mean())), np.finfo(float).tiny))
+        error, samples = np.sqrt(variance).astype(np.float32), (taken, float(taken), taken)
+        return Outcome(pixels.astype(np.float32), error, Interval(value, 0.0, np.inf), samples, None, self.goal.error is None)
+
+
+def _parts(tiles: IntArray, size: int) -> list[IntArray]:
+    return [tiles[at : at + size] for at in range(0, len(tiles), size)]
