@@ -156,3 +156,9 @@ def test_malformed_line_is_told_with_its_place(line: str, column: int, words: st
         parse_scene("E 0 0 0\nV 0 0 1\nF 40\nR 4 4\nM 1 1 1 0 0 0 1 0\nS 0 0 5 1\n" + line + "\n")
     assert f":{7 + line.count(chr(10))}:{column}: error:" in str(error.value)
     assert words in str(error.value)
+
+
+@pytest.mark.parametrize(("lines", "dark"), [("indirect\n", 1), ("background 1 1 1\n", 1), ("background 1 1 1\nindirect\n", 0)])
+def test_background_counts_as_light_where_surfaces_hand_it_on(lines: str, dark: int) -> None:
+    warnings = parse_scene(VIEW + "M 1 1 1 0 1 0 1 0\nS 0 0 3 1\n" + lines).warnings
+    assert sum("there is no light" in warning for warning in warnings) == dark

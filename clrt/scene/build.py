@@ -19,7 +19,7 @@ from clrt.scene.grammar import LETTERS
 from clrt.scene.include import expand
 from clrt.scene.instances import build_instances, splits
 from clrt.scene.mesh_lines import place_mesh_lines, read_mesh_lines
-from clrt.scene.model import Instance, Material, MeshObject, PointLight, Scene, Spheres
+from clrt.scene.model import Environment, Instance, Material, MeshObject, PointLight, Scene, Spheres
 from clrt.scene.models.direct import is_model, load_model_scene
 from clrt.scene.motion import with_motion
 from clrt.scene.objects import build_objects, material_of
@@ -95,12 +95,7 @@ def parse_scene(
     instances = (*meshes.instances, *instances)
     _check_absorption(objects, draft.materials, found, faults)
     faults.raise_if_any()
-    if not (draft.lights or draft.spots or draft.suns or environment or any(max(m.emission) > 0.0 for m in draft.materials)):
-        warnings.append("there is no light (L); only the ambient part of the materials is seen")
-    fog = draft.fields.get("fog")
-    if fog is not None and fog.density > 0.0 and (draft.suns or environment or any(draft.background)):
-        warnings.append("nothing comes through endless fog: suns, environment and background bring no light")
-    warnings += untilted(objects, draft.materials)
+    warnings += [*_light_warnings(draft, environment), *untilted(objects, draft.materials)]
     scene = Scene(
         camera, tuple(draft.lights), tuple(draft.materials), objects, _spheres(found), draft.background, draft.depth,
         source, tuple(warnings), textures=(*textured.textures, *meshes.textures), spots=tuple(draft.spots), suns=tuple(draft.suns),
@@ -112,6 +107,19 @@ def parse_scene(
     if origins:
         scene = origins.relined(replace(scene, warnings=tuple(map(origins.told, scene.warnings))))
     return _mirrored(scene) if right_handed else scene
+
+
+def _light_warnings(draft: Draft, environment: Environment | None) -> list[str]:
+    """Of a scene that nothing lights, and of light that fog keeps out."""
+    warnings = []
+    lamps = draft.lights or draft.spots or draft.suns or any(max(m.emission) > 0.0 for m in draft.materials)
+    around = any(draft.background) and "indirect" in draft.fields
+    if not (lamps or environment or around):
+        warnings.append("there is no light (L); only the ambient part of the materials is seen")
+    fog = draft.fields.get("fog")
+    if fog is not None and fog.density > 0.0 and (draft.suns or environment or any(draft.background)):
+        warnings.append("nothing comes through endless fog: suns, environment and background bring no light")
+    return warnings
 
 
 def _check_primitives(found: Declarations, faults: Faults) -> None:
