@@ -26,7 +26,7 @@ class Feature:
     material : members it adds to the Material struct: name, type, shape if it is no scalar; each is an attribute of `scene.model.Material`
     light : members it adds to the Light struct: name, type, shape if it is no scalar
     frame : members it adds to the Frame struct: name, type, shape if it is no scalar, and the function of the scene that gives the value
-    parameters : kernel arguments it adds: name of the packer in device/pack.py -> C declaration
+    parameters : kernel arguments it adds: name of the packer in device/effect_arrays.py -> C declaration
     rays : kinds of rays it spawns, as the counters name them
     branches : packets of rays that it may send on from one hit
     sampled : it draws random numbers: what is seen is a mean of samples
