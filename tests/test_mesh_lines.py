@@ -250,3 +250,13 @@ def test_real_meshes_are_read_whole(tmp_path: Path) -> None:
     (tmp_path / "scene.txt").write_text(CAMERA + RED + "".join(f"mesh {path}\n" for path in sorted(SHARED.glob("*.obj"))))
     found = load_scene(tmp_path / "scene.txt", allow_paths=[SHARED])
     assert {o.name: len(o) for o in found.objects} == {"stanford-bunny": 69451, "suzanne": 968, "teapot": 6320}
+
+
+def test_coordinates_of_a_file_without_pictures_serve_the_material_above(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2), (200, 100, 50)).save(tmp_path / "p.png")
+    found = scene(tmp_path, RED + "texture p.png\nmesh a.glb materials=above\n", a_glb=quad({}).glb())
+    (item,) = found.objects
+    assert item.uvs is not None
+    # glTF counts v from the top: each corner's v turned round.
+    corners = item.uvs.reshape(-1, 2)
+    assert {tuple(c) for c in corners.tolist()} == {(u, 1.0 - v) for u, v in np.asarray(QUAD_UV).tolist()}

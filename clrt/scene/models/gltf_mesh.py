@@ -59,7 +59,7 @@ def _read_primitive(document: Document, item: Item, placing: Sequence[UvMap | No
     materials = document.root.items("materials")
     material = item.refer("material", materials, "material") if item.has("material") else -1
     normals = _attribute(document, attributes, "NORMAL", 3, len(points)) if attributes.has("NORMAL") else None
-    uvs = _coordinates(document, attributes, placing[material], item, len(points)) if material >= 0 else None
+    uvs = _coordinates(document, attributes, placing[material] if material >= 0 else None, item, len(points))
     return Part(
         points[corners], np.full(len(corners), material, np.int32), None if normals is None else normals[corners],
         None if uvs is None else uvs[corners],
@@ -95,9 +95,11 @@ def _corners(document: Document, item: Item, mode: int, count: int) -> NDArray[n
 
 
 def _coordinates(document: Document, attributes: Item, at: UvMap | None, item: Item, count: int) -> FloatArray | None:
-    """(count, 2) u to the right, v up, or None where the material has no picture."""
+    """(count, 2) u to the right, v up. Without a picture of the material's own the first set, for another's; None where there is none."""
     if at is None:
-        return None
+        if not attributes.has("TEXCOORD_0"):
+            return None
+        at = UvMap(0, np.eye(2, 3))
     key = f"TEXCOORD_{at.texcoord}"
     if not attributes.has(key):
         document.notes.add(f"{item.path} has a picture but no {key}: it shows the colour of the picture's corner")
