@@ -6,10 +6,14 @@ import base64
 import io
 import json
 import struct
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PIL import Image
+
+from clrt.scene.build import load_scene
+from clrt.scene.model import Material, Scene
 
 KINDS = {"f4": 5126, "u4": 5125, "u2": 5123, "u1": 5121, "i2": 5122, "i1": 5120}
 TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
@@ -101,3 +105,15 @@ def quad(material: dict[str, Any] | None = None, **node: Any) -> Gltf:
     keys = {} if material is None else {"material": made.list("materials", material)}
     made.node(mesh=made.mesh(QUAD, QUAD_ORDER, QUAD_UV, **keys), **node)
     return made
+
+
+def loaded(tmp_path: Path, made: Gltf, **keys: Any) -> Scene:
+    """The scene that a file is read as."""
+    path = tmp_path / "model.glb"
+    path.write_bytes(made.glb())
+    return load_scene(path, **keys)
+
+
+def material(tmp_path: Path, given: dict[str, Any]) -> Material:
+    """What a material of a file is read as."""
+    return loaded(tmp_path, quad(given)).materials[0]

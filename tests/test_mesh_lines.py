@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from gltf_files import QUAD_UV, Gltf, quad, triangle
 from PIL import Image
 
 import clrt
@@ -16,7 +17,6 @@ from clrt.cli.main import cli
 from clrt.errors import SceneError
 from clrt.scene.build import load_scene
 from clrt.scene.model import Scene
-from tests.gltf_files import QUAD_UV, Gltf, quad, triangle
 
 pytest.importorskip("trimesh")
 

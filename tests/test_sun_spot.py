@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from reference_scenes import globe
 
 import clrt
 from clrt import renderer
@@ -20,7 +21,6 @@ from clrt.precision import RUNGS, rung
 from clrt.reference import ReferencePicture, render
 from clrt.scene.build import parse_scene
 from clrt.scene.model import Scene, SpotLight, SunLight
-from tests.reference_scenes import globe
 
 CAMERA = "E 0 0.5 -1.5\nV 0 -0.1 1\nF 60\nR 56 48\n"
 WHITE = "M 1 1 1  0 1 0 1  0\n"
