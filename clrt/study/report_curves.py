@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _RANDOM = -0.5  #: slope of the error of random sampling against time
 _FEW_DECADES = 2.6  #: below which 2 and 5 between powers of ten have ticks, too
-_SMALLEST = 1e-4  #: tick that is written without a power of ten
+_SMALLEST = 1e-3  #: tick that is written without a power of ten
 
 
 def draw_samples(figure: Figure, content: Mapping[str, Any]) -> str:
@@ -47,7 +47,7 @@ def draw_samples(figure: Figure, content: Mapping[str, Any]) -> str:
     if floor is not None and floor.high > 0.0:
         _shade(axes, floor)
     _label(axes, x, y, [str(_plain(row, "samples")) for row, seen in zip(rows, shown, strict=True) if seen])
-    axes.legend(loc="upper right")
+    figure.legend(loc="outside upper left", ncols=2)  # never over the curves
     return _samples_caption(rows, shown, error, slope, floor, ringed)
 
 
@@ -93,14 +93,13 @@ def draw_depth(figure: Figure, content: Mapping[str, Any]) -> str:
     if shown.sum() < 2:
         raise NothingToDraw
     axes = figure.subplots()
-    _curve(axes, seconds, error, shown, BLUE, "median and 95% interval")
+    _curve(axes, seconds, error, shown, BLUE, "median")
     _log_axes(axes, "time, s", "error" + (f", {error.unit}" if error.unit not in ("", "1") else ""))
     names = [_plain(row, "depth") for row, seen in zip(rows, shown, strict=True) if seen]
     _label(axes, seconds.medians[shown], error.medians[shown], names)
-    axes.legend(loc="upper right")
     first, last = (int(i) for i in np.flatnonzero(shown)[[0, -1]])
     words = [
-        f"Each point is a largest number of bounces, written beside it. From {_plain(rows[first], 'depth')} to "
+        f"Each point is a largest number of bounces, written beside it, with its 95% interval. From {_plain(rows[first], 'depth')} to "
         f"{_plain(rows[last], 'depth')} the error goes from {_in_words(error, first)} to {_in_words(error, last)} and the time from "
         f"{_in_words(seconds, first)} to {_in_words(seconds, last)}."
     ]
@@ -135,7 +134,7 @@ def draw_bias(figure: Figure, content: Mapping[str, Any]) -> str:
     axes.set_xticks(x, [_plain(row, "samples") for row, ok in zip(rows, samples.positive, strict=True) if ok])
     axes.minorticks_off()
     _y_ticks(axes)
-    axes.legend(loc="best")
+    figure.legend(loc="outside upper left", ncols=2)
     return _bias_caption(content, samples, series["bias_squared"])
 
 

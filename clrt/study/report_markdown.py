@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from clrt.study.report_plots import Plot
-from clrt.study.report_tables import Section, Table, header_lines
+from clrt.study.report_tables import Section, Table, header_lines, summary
 
 _SPECIAL = re.compile(r"([\\`*_\[\]<>|&#])")
 
@@ -16,7 +16,8 @@ def markdown(study: Mapping[str, Any], parts: Sequence[Section], plots: Sequence
     """The whole file: verdict, header, then a table a part with its plot."""
     header = study.get("header") or {}
     drawn = {plot.key: plot for plot in plots}
-    blocks = [f"# Accuracy against time: {escape(str(header.get('scene', 'a scene')))}", *_quick(header), "## Verdict", _verdict(study)]
+    blocks = [f"# Accuracy against time: {escape(str(header.get('scene', 'a scene')))}"]
+    blocks += [escape(summary(header)), *_quick(header), "## Verdict", _verdict(study)]
     blocks += ["## Measured on", "\n".join(f"- {name}: {escape(text)}" for name, text in header_lines(header))]
     for part in parts:
         blocks += _blocks(part, drawn.get(part.part.key))

@@ -87,7 +87,7 @@ def _scale(number: Number) -> tuple[float, str]:
         return _step(size, _BYTES, (1.0, "B"))
     if unit in ("rays/s", "1/s"):
         factor, prefix = _step(size, _RATES, (1.0, ""))
-        return factor, f" {prefix}{unit.removeprefix('1')}" if unit == "1/s" else f" {prefix} {unit}".replace("  ", " ")
+        return factor, f"{prefix or ' '}{unit.removeprefix('1')}" if unit == "1/s" else f"{prefix} {unit}"
     if unit == "share":
         return 0.01, "%"
     power = math.floor(math.log10(size)) if 0.0 < size < _SMALLEST_PLAIN else 0
@@ -102,7 +102,8 @@ def _step(size: float, steps: tuple[tuple[float, str], ...], least: tuple[float,
 
 def _places(median: float, low: float, high: float) -> int:
     """Digits after the point: to the first digit of the half width of the interval, within the bounds above."""
-    half, size = (high - low) / 2.0, abs(median)
+    half = (high - low) / 2.0
+    size = max(abs(median), half)
     lead = math.floor(math.log10(size)) if size > 0.0 else None
     if half <= 0.0:
         whole = math.isclose(median, round(median), rel_tol=1e-12)

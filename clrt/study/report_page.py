@@ -7,27 +7,24 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from clrt.errors import ClrtError
 from clrt.study.report_pictures import Pictures
 from clrt.study.report_plots import GREY, INK, LINES, Plot
-from clrt.study.report_tables import Section, header_lines
+from clrt.study.report_tables import Section, header_lines, summary
 
 _TEMPLATES = Path(__file__).parent / "page"
 
 
 def page(study: Mapping[str, Any], parts: Sequence[Section], plots: Sequence[Plot], pictures: Pictures) -> str:
-    """The text of study.html. Raises ClrtError where Jinja2 is missing."""
-    try:
-        from jinja2 import Environment, FileSystemLoader, StrictUndefined
-    except ImportError as error:
-        raise ClrtError("the page of a study needs matplotlib and Jinja2; install them: pip install 'clrt[study]'") from error
+    """The text of study.html."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
     # Everything from the JSON is escaped; only the plots, drawn here, are put in as they are.
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     header = study.get("header") or {}
     return environment.get_template("study.html").render(
-        scene=str(header.get("scene", "a scene")), quick=bool(header.get("quick")), header=header_lines(header),
+        scene=str(header.get("scene", "a scene")), quick=bool(header.get("quick")), header=header_lines(header), summary=summary(header),
         verdict=[str(sentence) for sentence in study.get("verdict") or []], parts=parts, pictures=pictures,
         plots={plot.key: (plot, inline_svg(plot)) for plot in plots},
     )  # fmt: skip

@@ -8,21 +8,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from clrt.errors import ClrtError
-
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 #: Colours that people with any kind of colour vision tell apart (Okabe and Ito, 2008), on light and on dark ground.
 BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072b2", "#d55e00", "#009e73", "#aa5c93", "#888888"
 INK, LINES = "#1f2328", "#d0d7de"  #: text and axes; grid. The page replaces both in a dark room
-INCHES = (7.0, 4.2)
+INCHES = (6.2, 4.0)
 _DPI = 150
 _STYLE: dict[str, Any] = {
     "svg.hashsalt": "clrt", "svg.fonttype": "path", "font.family": "DejaVu Sans", "font.size": 10.5, "axes.titlesize": 11,
     "axes.titleweight": "bold", "axes.spines.top": False, "axes.spines.right": False, "text.color": INK, "axes.labelcolor": INK,
     "axes.edgecolor": INK, "xtick.color": INK, "ytick.color": INK, "grid.color": LINES, "grid.linewidth": 0.7, "axes.axisbelow": True,
-    "axes.grid": False, "legend.frameon": False, "legend.fontsize": 9.5, "figure.facecolor": "white", "axes.facecolor": "none",
+    "axes.grid": False, "legend.frameon": False, "legend.fontsize": 9, "figure.facecolor": "white", "axes.facecolor": "none",
     "errorbar.capsize": 3.5, "lines.linewidth": 1.8,
 }  # fmt: skip
 
@@ -47,11 +45,9 @@ class NothingToDraw(Exception):
 
 @contextmanager
 def style() -> Iterator[None]:
-    """Settings of all plots, whatever matplotlibrc the user has. Raises ClrtError where matplotlib is missing."""
-    try:
-        from matplotlib import rc_context, rcParamsDefault
-    except ImportError as error:
-        raise ClrtError("the page of a study needs matplotlib and Jinja2; install them: pip install 'clrt[study]'") from error
+    """Settings of all plots, whatever matplotlibrc the user has."""
+    from matplotlib import rc_context, rcParamsDefault
+
     defaults: Any = rcParamsDefault
     settings = {name: value for name, value in defaults.items() if not name.startswith(("backend", "interactive", "toolbar"))}
     with rc_context(settings | _STYLE):

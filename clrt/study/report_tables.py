@@ -199,6 +199,13 @@ def header_lines(header: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [(name, text) for name, text in lines if text]
 
 
+def summary(header: Mapping[str, Any]) -> str:
+    """When, on what, in one line."""
+    lines = dict(header_lines(header))
+    version = lines.get("clrt")
+    return " · ".join(text for text in (lines.get("Date"), lines.get("Processor"), version and f"clrt {version}") if text)
+
+
 def _joined(*values: object) -> str:
     return " · ".join(text for text in map(_text, values) if text)
 
