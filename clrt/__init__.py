@@ -70,6 +70,9 @@ def render(
     count: bool = False,
     without: Iterable[str] = (),
     progress: Callable[[str, float], None] | None = None,
+    error: float | None = None,
+    within: float | None = None,
+    standard_error: bool = False,
 ) -> Image:
     """The picture of a scene, or of a scene text; its `stats` are the figures of the run.
 
@@ -82,6 +85,9 @@ def render(
     count : count rays and tests in a second pass
     without : names of effects to leave out, as `clrt explain` lists them, with what needs them
     progress : called with a phase and how much of it is done, 0 to 1
+    error : sample where it brings most until the picture's relative error is below this, with 95% (docs/error.md); not with `samples`
+    within : the best picture in this many seconds, from the call on; with `error`, too: until the first of both is reached
+    standard_error : the picture has a `standard_error` with plain `samples`, too, which are split over 8 independent sequences for it
 
     Raises SceneError, DeviceError, LimitError; OSError where a file cannot be read.
     """
@@ -95,7 +101,8 @@ def render(
     read_s = time.perf_counter() - start
     image = render_scene(
         loaded, size=size, tree=tree, device=device, precision=precision, depth=depth, samples=samples, seed=seed,
-        count=count, without=without, progress=progress
+        count=count, without=without, progress=progress, error=error, within=within, standard_error=standard_error,
+        deadline=None if within is None else start + within,
     )
     if image.stats is not None and loaded is not scene:
         image.stats.read_s = read_s

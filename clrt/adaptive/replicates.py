@@ -124,6 +124,8 @@ class Replicates:
             sums.base.release(self.queue)
 
     def replay(self, launches: Iterable[tuple[IntArray, int, int, int]]) -> None:
-        """The same launches by this tracer, which may be one that counts."""
+        """The same launches by this tracer, which is one that counts: adds to its counts."""
+        self.tracer.begin_counting()
         for tiles, first, end, i in launches:
             self.run(tiles, first, end, range(i, i + 1))
+        self.tracer.end_counting()

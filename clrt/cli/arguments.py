@@ -8,6 +8,9 @@ from pathlib import Path
 
 import click
 
+_NUMBER = r"[+-]?(?:[0-9]{1,18}(?:\.[0-9]{0,18})?|\.[0-9]{1,18})(?:[eE][+-]?[0-9]{1,3})?"
+_UNITS = {"ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+
 STDOUT = Path("-")  #: what `file_or_stdout` gives for `-`, to be told by identity: `./-` is a file
 
 
@@ -49,3 +52,19 @@ def size(value: str) -> tuple[int, int]:
     if not (1 <= width <= LARGEST_SIDE and 1 <= height <= LARGEST_SIDE):
         raise click.BadParameter(f"{value!r}: width and height go from 1 to {LARGEST_SIDE}")
     return width, height
+
+
+def fraction(value: str | float) -> float:
+    """A relative error such as 0.01 or 1%. Raises click.BadParameter; its range is checked where it is used."""
+    match = re.fullmatch(rf"({_NUMBER})(%?)", str(value))
+    if match is None:
+        raise click.BadParameter(f"'{value}': this is a relative error, such as 0.01 or 1%")
+    return float(match[1]) / (100.0 if match[2] else 1.0)
+
+
+def duration(value: str | float) -> float:
+    """Seconds, from such as 5, 5s, 300ms, 2min or 1h. Raises click.BadParameter; its range is checked where it is used."""
+    match = re.fullmatch(rf"({_NUMBER}) ?({'|'.join(_UNITS)})?", str(value))
+    if match is None:
+        raise click.BadParameter(f"'{value}': this is a time, such as 5s, 2min or plain seconds")
+    return float(match[1]) * _UNITS[match[2] or "s"]

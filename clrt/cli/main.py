@@ -15,7 +15,7 @@ from clrt.cli import failure, streams
 from clrt.cli.paths import DEFAULT_SCENE
 
 #: a command and the module that has it, in the order of the help; imported when called for, so that `clrt --help` is quick
-_COMMANDS = {"render": "render", "explain": "explain", "devices": "devices", "verify": "verify", "convert": "scenes", "make": "scenes"}
+_COMMANDS = {"render": "render", "explain": "explain", "study": "study", "devices": "devices", "verify": "verify", "convert": "scenes", "make": "scenes"}
 
 _HELP = """Render a scene text or a glTF model to a picture.
 
@@ -101,8 +101,9 @@ def cli() -> None:
 
 def main() -> None:
     """The console script: the command under a guard that lets Ctrl-C end it within a second."""
-    from clrt.cli import interrupt
+    from clrt.cli import clock, interrupt
 
+    clock.begin()
     streams.hold_descriptors()
     interrupt.watch()
     try:

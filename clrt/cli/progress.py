@@ -41,6 +41,13 @@ class PhaseProgress:
             self._phase, self._phase_start = phase, time.monotonic()
         self._fraction = min(max(fraction, 0.0), 1.0)
 
+    def say(self, text: str) -> None:
+        """A line that stays, on standard error."""
+        if self._live is not None:
+            self._live.console.print(text, highlight=False, markup=False)
+        elif not self._quiet:
+            streams.complain(text + "\n")
+
     def __enter__(self) -> PhaseProgress:
         if not self._quiet and streams.is_terminal(sys.stderr):
             from rich.console import Console

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from clrt.cli import arguments as kinds
-from clrt.cli import failure, paths, streams
+from clrt.cli import clock, failure, paths, streams
 from clrt.cli.progress import PhaseProgress
 from clrt.errors import ClrtError
 
@@ -41,6 +41,13 @@ class Options:
     allow_path: tuple[Path, ...]
     camera: int | None
     without: tuple[str, ...]
+    error: float | None
+    within: float | None
+    stderr: Path | None
+
+
+#: what follows a render: seconds to print figures and to end, and seconds a pixel to write a picture, and as many for a second one
+_AFTER_S, _AFTER_PIXEL_S = 0.2, 6e-8
 
 
 @click.command("render", short_help="Render a scene; the word is never needed.")
@@ -68,21 +75,30 @@ class Options:
 @click.option("--camera", type=kinds.whole(1), metavar="N", help="Which camera of a glTF file to look through.  [default: 1]")
 @click.option("--allow-path", type=kinds.file, multiple=True, metavar="DIR", help="Permit the scene to name files in DIR, too.")
 @click.option("--without", multiple=True, metavar="EFFECT", help="Leave out an effect of `clrt explain`; may be repeated.")
+@click.option(
+    "--error",
+    type=kinds.fraction,
+    metavar="E",
+    help="Sample until the picture's relative error (root mean square over pixels, over the picture's mean) is below E, such as 0.01, with 95%.",
+)
+@click.option("--within", type=kinds.duration, metavar="T", help="The best picture in this time, such as 5s or 2min, compiling included.")
+@click.option("--stderr", type=kinds.file, metavar="FILE", help="Write a map of each pixel's standard error, too: .png or .exr.")
 @click.option("-q", "--quiet", is_flag=True, help="Print no figures and no progress.")
 def render(**arguments: Any) -> None:
     """Render SCENE to a picture. The same as `clrt SCENE`."""
-    start = time.perf_counter()
+    start = clock.begun()
     options = Options(**arguments)
     scene_path = _scene_path(options)
     picture = options.out or Path(scene_path.stem + ".png")
     _check(options, scene_path, picture)
     with PhaseProgress(quiet=options.quiet) as progress:
         scene, read_s = _read(options, scene_path, progress)
-        image = _render(options, scene, progress)
+        image = _render(options, scene, progress, start)
         write_s = _write(options, image, picture, progress)
     stats = image.stats
     if stats is None:
         return
+    white = _write_error_map(options, image)
     stats.read_s, stats.write_s = read_s, write_s
     stats.total_s = time.perf_counter() - start - stats.count_s
     if options.stats is kinds.STDOUT:
@@ -92,7 +108,7 @@ def render(**arguments: Any) -> None:
     if not options.quiet and options.stats is not kinds.STDOUT:
         from clrt.cli.report import print_report
 
-        print_report(stats, picture)
+        print_report(stats, picture, "" if white is None else f"{options.stderr}, white is {white:g}")
 
 
 def _scene_path(options: Options) -> Path:
@@ -107,13 +123,19 @@ def _check(options: Options, scene_path: Path, picture: Path) -> None:
     """Raise now what would else be said after the work."""
     paths.check_scene(scene_path)
     figures = None if options.stats is kinds.STDOUT else options.stats
-    outputs = {"picture": picture, "file of figures": figures, "kernel": options.dump_kernel}
+    outputs = {"picture": picture, "file of figures": figures, "kernel": options.dump_kernel, "map of errors": options.stderr}
     paths.check_outputs({"scene": scene_path}, outputs)
     from clrt.features.choice import effect_names
     from clrt.image.image import check_format
     from clrt.precision import rung
 
     check_format(picture, options.srgb)
+    if options.stderr is not None:
+        check_format(options.stderr)
+    if options.error is not None or options.within is not None or options.stderr is not None:
+        from clrt.adaptive.request import Request
+
+        Request.of(options.error, options.within, options.samples, options.stderr is not None, None)
     rung(options.precision)
     effect_names(options.without)
 
@@ -133,8 +155,15 @@ def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene,
     return scene, time.perf_counter() - start
 
 
-def _render(options: Options, scene: Scene, progress: PhaseProgress) -> Image:
+def _render(options: Options, scene: Scene, progress: PhaseProgress, start: float) -> Image:
+    from clrt.cli.accuracy import foretold
     from clrt.renderer import render as render_scene
+
+    deadline = None
+    if options.within is not None:
+        width, height = options.size or (scene.camera.width, scene.camera.height)
+        pictures = 1 + (options.stderr is not None)
+        deadline = start + options.within - _AFTER_S - _AFTER_PIXEL_S * width * height * pictures
 
     with failure.warnings_told():
         return render_scene(
@@ -150,6 +179,11 @@ def _render(options: Options, scene: Scene, progress: PhaseProgress) -> Image:
             without=options.without,
             progress=progress,
             dump_kernel=options.dump_kernel,
+            error=options.error,
+            within=options.within,
+            standard_error=options.stderr is not None,
+            deadline=deadline,
+            foretell=lambda told: progress.say(foretold(told, options.error)),
         )
 
 
@@ -160,3 +194,12 @@ def _write(options: Options, image: Image, picture: Path, progress: PhaseProgres
     with failure.warnings_told():
         image.save(picture, srgb=options.srgb)
     return time.perf_counter() - start
+
+
+def _write_error_map(options: Options, image: Image) -> float | None:
+    """Write the map that was asked for; what its white stands for."""
+    if options.stderr is None or image.standard_error is None:
+        return None
+    from clrt.image.error_map import save_error_map
+
+    return save_error_map(options.stderr, image.standard_error)

@@ -20,11 +20,11 @@ _MAX_OBJECTS = 24  #: rows of the table; the JSON has all
 _UNBOUNDED = 10_000  #: columns, where no terminal sets a width
 
 
-def print_report(stats: RunStats, picture: Path) -> None:
+def print_report(stats: RunStats, picture: Path, error_map: str = "") -> None:
     """Print tables of objects and times, then lines: coloured and folded on a terminal, plain text elsewhere."""
     from rich.text import Text
 
-    print_plainly([object_table(stats), Text(), time_table(stats), Text(), fact_lines(stats, picture)])
+    print_plainly([object_table(stats), Text(), time_table(stats), Text(), fact_lines(stats, picture, error_map)])
 
 
 def print_plainly(renderables: list[RenderableType]) -> None:
@@ -80,8 +80,8 @@ def time_table(stats: RunStats) -> Table:
     return result
 
 
-def fact_lines(stats: RunStats, picture: Path) -> Table:
-    """Rays, their rate, the device, what the scene calls for, the picture."""
+def fact_lines(stats: RunStats, picture: Path, error_map: str = "") -> Table:
+    """Rays, their rate, the device, what the scene calls for, its error where that is known, the picture."""
     from rich.table import Table
     from rich.text import Text
 
@@ -99,6 +99,13 @@ def fact_lines(stats: RunStats, picture: Path) -> Table:
     if stats.bias:
         lines.add_row("bias", Text(f"{stats.bias}; without the clamp the mean is right"))
     lines.add_row("precision", Text(f"{stats.precision}, {stats.tree} trees"))
+    if stats.accuracy is not None:
+        from clrt.cli.accuracy import outcome_lines
+
+        for name, text in outcome_lines(stats):
+            lines.add_row(name, Text(text))
+    if error_map:
+        lines.add_row("error map", Text(error_map))
     lines.add_row("picture", Text(f"{_printable(picture)}, {stats.width} x {stats.height}"))
     return lines
 

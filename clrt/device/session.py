@@ -190,20 +190,30 @@ class Tracer:
 
     def run(self, first_row: int, end_row: int) -> None:
         """Renders rows [first_row, end_row) and waits for them. In the counting build, adds to `counts`."""
-        import pyopencl as cl
-
         packet_width, packet_height = program.PACKETS[self.lanes]
         columns = _multiple(-(-self.width // packet_width), program.LOCAL_SIZE[0])
         rows = _multiple(max(1, -(-(end_row - first_row) // packet_height)), program.LOCAL_SIZE[1])
         queue = self.buffers.device.queue
         if self.counting:
-            self.counters[:] = 0
-            cl.enqueue_copy(queue, self._counter_buffer, self.counters)
+            self.begin_counting()
         self.kernel(queue, (columns, rows), program.LOCAL_SIZE, *self._before, np.int32(first_row), np.int32(end_row), *self._after)
         queue.finish()
         if self.counting:
-            cl.enqueue_copy(queue, self.counters, self._counter_buffer)
-            self.counts += self.counters.astype(np.int64)
+            self.end_counting()
+
+    def begin_counting(self) -> None:
+        """What is launched next is counted from 0. In the counting build alone, as is `end_counting`."""
+        import pyopencl as cl
+
+        self.counters[:] = 0
+        cl.enqueue_copy(self.buffers.device.queue, self._counter_buffer, self.counters)
+
+    def end_counting(self) -> None:
+        """Adds what was counted to `counts`."""
+        import pyopencl as cl
+
+        cl.enqueue_copy(self.buffers.device.queue, self.counters, self._counter_buffer)
+        self.counts += self.counters.astype(np.int64)
 
     def picture(self) -> NDArray[np.float32]:
         """(height, width, 3) float32, linear."""
