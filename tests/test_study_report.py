@@ -97,7 +97,7 @@ def painted(paint: Any, content: dict[str, Any]) -> tuple[Figure, str]:
         (0.0001, 0.0001, 0.0001, "", "1\N{MULTIPLICATION SIGN}10⁻⁴"),
         (-0.66, -0.69, -0.63, "", "-0.66 (-0.69 to -0.63)"),
         (1.16, 1.1599999, 1.1600001, "x", "1.160x (1.160 to 1.160)"),
-        (0.00001, -0.02, 0.02, "", "0.00 (-0.02 to 0.02)"),
+        (0.00001, -0.02, 0.02, "", "0.000 (-0.020 to 0.020)"),
     ],
 )
 def test_number_as_text(median: float, low: float, high: float, unit: str, text: str) -> None:
@@ -232,7 +232,8 @@ def test_caption_claims_a_cost_only_where_the_interval_parts() -> None:
 def test_effects_are_drawn_dearest_first() -> None:
     figure, caption = painted(draw_effects, study_example.study()["effects"])
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["mirrors", "shadows", "smooth", "triangles"]
-    assert [bar.get_width() for bar in figure.axes[0].patches] == pytest.approx([305, 121, 4])  # milliseconds
+    bars: list[Any] = list(figure.axes[0].patches)
+    assert [bar.get_width() for bar in bars] == pytest.approx([305, 121, 4])  # milliseconds
     assert "Not to be told from nothing in time: smooth." in caption
 
 
