@@ -34,11 +34,12 @@ Tell = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Difference:
-    """Two pictures: greatest and mean absolute difference of their channels, and the part of pixels that differ at all."""
+    """Two pictures: greatest, mean and root mean square of their channels' differences, and the part of pixels that differ at all."""
 
     greatest: float
     mean: float
     pixels: float
+    rms: float
 
     @classmethod
     def of(cls, a: NDArray[np.float32], b: NDArray[np.float32]) -> Difference:
@@ -47,7 +48,7 @@ class Difference:
         with np.errstate(invalid="ignore"):
             apart = np.where(differs, np.abs(a.astype(np.float64) - b), 0.0)
         apart = np.where(np.isnan(apart), np.inf, apart)
-        return cls(float(apart.max()), float(apart.mean()), float(differs.any(-1).mean()))
+        return cls(float(apart.max()), float(apart.mean()), float(differs.any(-1).mean()), float(np.sqrt(np.mean(apart**2))))
 
 
 @dataclass(frozen=True)

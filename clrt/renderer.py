@@ -260,7 +260,7 @@ def _count(prepared: Prepared, buffers: Buffers, stats: RunStats, tell: Progress
     """The same picture again by the counting build, by the same launches if it was made of replicates: rays by kind, tests by object."""
     precision, device = buffers.precision, buffers.device
     lanes = precision.lanes(device.info.lanes)
-    shape = program_shape(prepared, buffers.features, buffers.shared_lights)
+    shape = program_shape(_as_called(prepared, buffers.features), buffers.features, buffers.shared_lights)
     tracer = Tracer(
         buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True
     )

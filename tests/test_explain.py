@@ -147,7 +147,7 @@ def test_difference_of_pictures_counts_numbers_and_no_numbers() -> None:
     a = np.zeros((2, 2, 3), np.float32)
     b = a.copy()
     b[0, 0] = (0.5, 0.0, -1.0)
-    assert Difference.of(a, b) == Difference(1.0, 1.5 / 12.0, 0.25)
+    assert Difference.of(a, b) == Difference(1.0, 1.5 / 12.0, 0.25, np.sqrt(1.25 / 12.0))
     a[1, 1, 0] = b[1, 1, 0] = np.nan
     assert Difference.of(a, b).pixels == 0.25
     b[1, 1, 0] = 0.0

@@ -25,6 +25,7 @@ from clrt.reference.expand import expanded
 from clrt.scene.build import load_scene, parse_scene
 from clrt.scene.emitters import emitters_of
 from clrt.scene.model import Scene
+from clrt.scene.placed import seen
 
 BOUND = 1e-5
 MARGIN = 2e-5
@@ -287,3 +288,9 @@ def test_ten_thousand_spheres_are_faster_by_the_tree(monkeypatch: pytest.MonkeyP
         renderer.run_rows(tracer, "render", _quiet)
         seconds.append(time.process_time() - start)
     assert seconds[0] < seconds[1] / 4
+
+
+def test_scene_without_instances_is_itself() -> None:
+    """Else its trees would be built again, by another builder than the one that was asked for."""
+    scene = load_scene(Path(__file__).parents[1] / "scenes" / "first.txt")
+    assert seen(scene, False, False) is scene

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import subprocess
-from datetime import datetime, timezone
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 from clrt import __version__
 from clrt.device.context import DeviceInfo
+from clrt.machine import cores, cpu_model, load_average, memory_gib, now
 
-_CPU_INFO = Path("/proc/cpuinfo")
+__all__ = ["cores", "cpu_model", "describe", "load_average", "now"]
 
 
 def describe(device: DeviceInfo) -> dict[str, Any]:
@@ -21,7 +20,7 @@ def describe(device: DeviceInfo) -> dict[str, Any]:
     return {
         "cpu": cpu_model(),
         "cores": cores(),
-        "memory_gib": _memory_gib(),
+        "memory_gib": memory_gib(),
         "os": platform.platform(),
         "python": platform.python_version(),
         "opencl_device": device.name,
@@ -33,34 +32,6 @@ def describe(device: DeviceInfo) -> dict[str, Any]:
         "clrt": __version__,
         "commit": _commit(),
     }
-
-
-def now() -> str:
-    """Date and time in UTC, to the second, ISO 8601."""
-    return datetime.now(timezone.utc).isoformat(timespec="seconds")
-
-
-def load_average() -> list[float]:
-    """Processes that wanted to run, over the last 1, 5 and 15 minutes."""
-    return [round(value, 2) for value in os.getloadavg()]
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def cpu_model() -> str:
-    """The processor's name as it tells it."""
-    if _CPU_INFO.exists():
-        for line in _CPU_INFO.read_text(errors="replace").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
-
-
-def _memory_gib() -> float:
-    return round(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2**30, 1)
 
 
 def _version(package: str) -> str | None:

@@ -103,8 +103,8 @@ def main() -> None:
     """The console script: the command under a guard that lets Ctrl-C end it within a second."""
     from clrt.cli import clock, interrupt
 
-    clock.begin()
     streams.hold_descriptors()
+    clock.begin()
     interrupt.watch()
     try:
         cli.main(prog_name="clrt")

@@ -12,7 +12,7 @@ from clrt.files import check_writable
 
 DEFAULT_SCENE = "input.txt"  #: rendered where no scene is given
 
-_COMMANDS = ("devices", "explain", "convert", "make", "render")
+_COMMANDS = ("devices", "explain", "study", "convert", "make", "render")
 _MESHES = {".obj", ".ply", ".stl", ".off"}  #: not scenes by themselves, as .gltf and .glb are
 
 

@@ -79,7 +79,7 @@ def placements(scene: Scene) -> Placements:
 
 def seen(scene: Scene, instances: bool = True, motion: bool = True) -> Scene:
     """The scene without hidden objects that have no instance; without instances, or the objects' motion, where these are left out."""
-    if not instances:
+    if not instances and scene.instances:
         scene = replace(scene, instances=())
     if not motion and any(moves(item) for item in scene.objects):
         scene = replace(scene, objects=tuple(replace(item, motion=(0.0, 0.0, 0.0)) for item in scene.objects))

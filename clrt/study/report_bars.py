@@ -86,16 +86,18 @@ def draw_trees(figure: Figure, content: Mapping[str, Any]) -> str:
     for axes in panels[len(series):]:
         axes.remove()
     words = [_compare(names, series[key], what) for key, what in (("tests_per_ray", "tests a ray"), ("trace", "trace")) if key in series]
-    return " ".join(["Build time, tests a ray, trace time and size, by tree.", *(word for word in words if word)])
+    return " ".join(word for word in words if word)
 
 
 def _compare(names: list[str], values: Series, what: str) -> str:
-    known = [(n, name) for n, name in zip(values.numbers, names, strict=True) if n]
+    """All of them, and which is the least where its interval lies below all others."""
+    known = [(name, n.without_unit()) for n, name in zip(values.numbers, names, strict=True) if n]
     if len(known) < 2:
         return ""
-    (best, best_name), *_ = sorted(known, key=lambda pair: pair[0].median)
-    others = ", ".join(f"{name} {n.without_unit()}" for n, name in known if name != best_name)
-    return f"Least {what}: {best_name}, {best.without_unit()}; {others}."
+    listed = f"{what[:1].upper()}{what[1:]}: {', '.join(f'{name} {number}' for name, number in known)}"
+    (least, best), *others = sorted(known, key=lambda pair: pair[1].median)
+    apart = all(best.high < number.low for _, number in others)
+    return f"{listed}; {least} has the least." if apart else f"{listed}; the least is not to be told."
 
 
 def draw_phases(figure: Figure, content: Mapping[str, Any]) -> str:

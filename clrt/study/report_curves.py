@@ -143,7 +143,7 @@ def _bias_caption(content: Mapping[str, Any], samples: Series, bias: Series) -> 
     if hidden := int((samples.known & bias.known & ~bias.positive).sum()):
         words.append(f"In {hidden} of {int(bias.known.sum())} rows the estimated bias is zero or less, which these axes cannot show.")
     if isinstance(verdict := content.get("verdict"), str):
-        words.append(f"Found: {verdict}.")
+        words.append(f"Found: {verdict.rstrip('.')}.")
     return " ".join(words)
 
 

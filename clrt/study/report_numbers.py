@@ -10,6 +10,7 @@ from typing import Any
 NONE = "-"  #: stands where nothing was measured
 _MOST_DIGITS, _FEWEST_DIGITS = 4, 2  #: significant digits of a median that has an interval
 _PLAIN_DIGITS = 3  #: of a number that has none
+_SKEWED = 10.0  #: times the median: an interval that reaches farther has ends with digits of their own
 _SMALLEST_PLAIN = 1e-3  #: below it a number is written with a power of ten
 SCALED = ("s", "B", "bytes", "rays/s", "1/s", "share", "x", "%")  #: units that stand behind every number
 TIMES = "\N{MULTIPLICATION SIGN}"
@@ -55,6 +56,8 @@ class Number:
         """As `1.16x (1.13 to 1.19)`; the interval is in the unit of the median."""
         factor, suffix = _scale(self)
         median, low, high = (value / factor for value in (self.median, self.low, self.high))
+        if self.has_interval and max(abs(low), abs(high)) > _SKEWED * abs(median) > 0.0:
+            return f"{_rounded(median)}{suffix} ({_rounded(low)} to {_rounded(high)})"
         places = _places(median, low, high)
         text = _fixed(median, places) + suffix
         return f"{text} ({_fixed(low, places)} to {_fixed(high, places)})" if self.has_interval else text
@@ -80,7 +83,9 @@ def _finite(value: object) -> float | None:
 
 def _scale(number: Number) -> tuple[float, str]:
     """What to divide by, and what then stands behind the number."""
-    size, unit = max(abs(number.median), abs(number.high - number.low) / 2.0), number.unit
+    size, unit = abs(number.median), number.unit
+    if number.low <= 0.0 <= number.high:  # next to nothing: what is known of it is the width of the interval
+        size = max(size, (number.high - number.low) / 2.0)
     if unit == "s":
         return _step(size, _TIMES, _TIMES[0] if size == 0.0 else _TIMES[-1])
     if unit in ("B", "bytes"):
@@ -112,6 +117,12 @@ def _places(median: float, low: float, high: float) -> int:
     if lead is not None:
         places = min(max(places, _FEWEST_DIGITS - 1 - lead), _MOST_DIGITS - 1 - lead)
     return max(places, 0)
+
+
+def _rounded(value: float) -> str:
+    """With few significant digits of its own: ends of an interval far from the median share no digits with it."""
+    lead = math.floor(math.log10(abs(value))) if value else 0
+    return _fixed(round(value, _FEWEST_DIGITS - 1 - lead), max(_FEWEST_DIGITS - 1 - lead, 0)) if value else "0"
 
 
 def _fixed(value: float, places: int) -> str:

@@ -5,11 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from clrt.study.report_pictures import Pictures
 from clrt.study.report_plots import GREY, INK, LINES, Plot
 from clrt.study.report_tables import Section, header_lines, summary
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
 
 _TEMPLATES = Path(__file__).parent / "page"
 
@@ -22,12 +25,20 @@ def page(study: Mapping[str, Any], parts: Sequence[Section], plots: Sequence[Plo
     environment = Environment(
         loader=FileSystemLoader(_TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["words"] = _words
     header = study.get("header") or {}
     return environment.get_template("study.html").render(
         scene=str(header.get("scene", "a scene")), quick=bool(header.get("quick")), header=header_lines(header), summary=summary(header),
         verdict=[str(sentence) for sentence in study.get("verdict") or []], parts=parts, pictures=pictures,
         plots={plot.key: (plot, inline_svg(plot)) for plot in plots},
     )  # fmt: skip
+
+
+def _words(text: str) -> Markup:
+    """A sentence, escaped, with what stands between backquotes as code."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def inline_svg(plot: Plot) -> str:

@@ -99,7 +99,7 @@ def section(study: Study, part: Part) -> Section:
     if not isinstance(content, Mapping):
         return Section(part, None, ["Not measured."])
     rows = [row for row in content.get("rows") or [] if isinstance(row, Mapping)]
-    notes = [str(content["note"])] if content.get("note") else []
+    notes = [_sentence(str(content["note"]))] if content.get("note") else []
     table = _table(part, rows) if rows else None
     if table is None and not notes:
         notes = ["Not measured."]
@@ -160,16 +160,20 @@ def _runs(rows: list[Mapping[str, Any]]) -> str:
     return f"Medians of {fewest if fewest == most else f'{fewest} to {most}'} runs, with 95% intervals in parentheses."
 
 
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
+
+
 def _facts(content: Mapping[str, Any]) -> Iterator[str]:
     """What stands beside the rows of a part."""
     if (slope := Number.of(content.get("slope"))) is not None:
         yield f"Measured slope of error against {slope_axis(slope)} on logarithmic axes: {slope.without_unit()} (random sampling: -0.5)."
     if isinstance(note := content.get("slope_note"), str):
-        yield f"{note[:1].upper()}{note[1:]}."
+        yield _sentence(note)
     if (floor := Number.of(content.get("floor"))) is not None:
         yield f"Noise floor, the error of the reference itself: {floor}."
     if isinstance(verdict := content.get("verdict"), str):
-        yield f"Verdict: {verdict}."
+        yield _sentence(f"verdict: {verdict}")
 
 
 def slope_axis(slope: Number) -> str:
