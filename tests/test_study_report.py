@@ -97,7 +97,9 @@ def painted(paint: Any, content: dict[str, Any]) -> tuple[Figure, str]:
         (0.0001, 0.0001, 0.0001, "", "1\N{MULTIPLICATION SIGN}10⁻⁴"),
         (-0.66, -0.69, -0.63, "", "-0.66 (-0.69 to -0.63)"),
         (1.16, 1.1599999, 1.1600001, "x", "1.160x (1.160 to 1.160)"),
-        (0.00001, -0.02, 0.02, "", "0.000 (-0.020 to 0.020)"),
+        (0.0037, 0.0000012, 2.6122, "s", "3.7 ms (0.0012 to 2,600)"),
+        (0.00082, -0.01447, 0.01499, "s", "0.82 ms (-14 to 15)"),
+        (0.00001, -0.02, 0.02, "", "0.000010 (-0.020 to 0.020)"),
     ],
 )
 def test_number_as_text(median: float, low: float, high: float, unit: str, text: str) -> None:
@@ -164,7 +166,7 @@ def test_part_without_rows_shows_its_note_and_no_table(tmp_path: Path) -> None:
     content["depth"] = {"rows": [], "note": "nothing in the scene sends rays on"}
     content["trees"] = None
     parts = {part.key: section(content, part) for part in PARTS}
-    assert (parts["depth"].table, parts["depth"].notes) == (None, ["nothing in the scene sends rays on"])
+    assert (parts["depth"].table, parts["depth"].notes) == (None, ["Nothing in the scene sends rays on."])
     assert (parts["trees"].table, parts["trees"].notes) == (None, ["Not measured."])
 
 
