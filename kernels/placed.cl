@@ -17,7 +17,8 @@ HOT void placed_leaf(const Geometry *geometry, const int b, const Rays *rays, ma
 
 // `place` below object_count: an object at its own place. A ray that starts on a placement passes by its triangle there alone.
 // One copy: inlined wherever rays are traced, it makes up a quarter of what a program takes to compile, and is no faster.
-static __attribute__((noinline)) void placed_trace(const Geometry *geometry, const int place, const Rays *rays, mask_n active, const int any_hit, Hits *hits) {
+static __attribute__((noinline)) void placed_trace(const Geometry *geometry, const int place, const Rays *rays, mask_n active, const int any_hit,
+                                                   Hits *hits) {
     const int number = place < geometry->object_count ? -1 : place - geometry->object_count;
     int b = place;
     Geometry seen = *geometry;
@@ -52,7 +53,6 @@ static __attribute__((noinline)) void placed_trace(const Geometry *geometry, con
 HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit, real_n *inner) {
     real point[3][LANES];
     for (int a = 0; a < 3; a++) store_lanes(hit->point[a], point[a]);
-    //@ placed_lanes
     for (int k = 0; k < LANES; k++) {
         if (hit->place[k] < 0) continue;
         global const Placement *from = geometry->placements + hit->place[k];

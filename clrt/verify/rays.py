@@ -130,14 +130,6 @@ def whole_frame(rng: Random) -> tuple[Array, Array, Array]:
             return s.astype(np.float64), u.astype(np.float64), n.astype(np.float64)
 
 
-def rotated(rng: Random, points: Array) -> Array:
-    """Points (..., 3) turned about the origin by a random rotation, float64."""
-    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
-    turn = q * np.sign(np.diag(r))
-    turn[:, 0] *= np.sign(np.linalg.det(turn))
-    return np.asarray(points.astype(np.float64) @ turn.T)
-
-
 def cube(half: float = 1.0) -> Triangles:
     """The closed cube [-half, half]^3, 12 triangles, float64."""
     axes = np.eye(3) * half
