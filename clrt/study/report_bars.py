@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _LONGEST_NAME = 28  #: characters of a name beside a bar
 _ROOM = 1.45  #: length of the axis over that of the longest bar: room for the numbers at their ends
+_ROOM_BEGINS = 0.82  #: part of the axis beyond which a number beside a whisker would run out of the plot
+_CUT = 2.5  #: times the longest bar, at which whiskers are cut
 
 
 def draw_precision(figure: Figure, content: Mapping[str, Any]) -> str:
@@ -65,7 +67,9 @@ def draw_effects(figure: Figure, content: Mapping[str, Any]) -> str:
     if error_key:
         what = "error" if error_key == "error" else "difference"
         _bars(panels[1], names, Series.of(rows, error_key), ORANGE, f"{what} without it")
-    words = [f"The dearest effect is {names[0]}, {cost.numbers[0]}."]
+    dearest, *others = [n for n in cost.numbers if n]
+    apart = all(dearest.low > other.high for other in others)
+    words = [f"The dearest effect{'' if apart else ' by its median'} is {names[0]}, {dearest}."]
     if free := [name for name, n in zip(names, cost.numbers, strict=True) if n and n.has_interval and n.low <= 0.0 <= n.high]:
         words.append(f"Not to be told from nothing in time: {', '.join(free)}.")
     return " ".join(words)
@@ -110,7 +114,9 @@ def draw_phases(figure: Figure, content: Mapping[str, Any]) -> str:
     names = _names(rows, "phase")
     _bars(figure.subplots(), names, seconds, BLUE, "time")
     largest = int(np.nanargmax(seconds.medians))
-    return f"Phases from first to last. The longest is {names[largest]}: {seconds.numbers[largest]}."
+    longest, *others = sorted((n for n in seconds.numbers if n), key=lambda n: -n.median)
+    claim = "The longest is" if all(longest.low > other.high for other in others) else "The longest by its median is"
+    return f"Phases from first to last. {claim} {names[largest]}: {longest}."
 
 
 def _names(rows: Rows, key: str) -> list[str]:
@@ -120,8 +126,6 @@ def _names(rows: Rows, key: str) -> list[str]:
 
 def _bars(axes: Axes, names: list[str], values: Series, colour: str, title: str) -> None:
     """Lying bars, the first on top, with whiskers for intervals and the median written at the end of each."""
-    from matplotlib.ticker import FuncFormatter, MaxNLocator
-
     shown, places = values.known, np.arange(len(names))
     factor, unit = values.axis
     medians, spread = values.medians / factor, shown & (values.highs > values.lows)
@@ -129,22 +133,43 @@ def _bars(axes: Axes, names: list[str], values: Series, colour: str, title: str)
     axes.errorbar(medians[spread], places[spread], xerr=values.whiskers(spread, 1.0 / factor), fmt="none", ecolor=INK, elinewidth=1.2)
     axes.set_yticks(places, [_safe(name) for name in names])
     axes.set_ylim(len(names) - 0.4, -0.6)
-    axes.set_title(title if unit in ("", *title.split()) else f"{title}, {unit}", loc="left")
-    axes.xaxis.set_major_locator(MaxNLocator(4))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.6g}"))
+    axes.set_title(title, loc="left")
+    axes.set_xlabel("" if unit in title.split() else unit)
     axes.tick_params(axis="y", length=0)
     axes.grid(True, axis="x")
-    top, bottom = max(float(values.highs[shown].max()), 0.0) / factor, min(float(values.lows[shown].min()), 0.0) / factor
-    axes.set_xlim(bottom * 1.05, top * _ROOM if top > 0.0 else 1.0 if bottom == 0.0 else -bottom * 0.5)
+    _length(axes, values, factor)
     _numbers(axes, values, factor)
 
 
+def _length(axes: Axes, values: Series, factor: float) -> None:
+    """From nothing to the longest bar; a whisker that is much longer than all bars is cut, and the numbers beside the bars get room."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator
+
+    shown = values.known
+    longest = float(np.abs(values.medians[shown]).max())
+    reach = _CUT * longest if longest > 0.0 else np.inf
+    top = min(max(float(values.highs[shown].max()), 0.0), reach) / factor
+    bottom = max(min(float(values.lows[shown].min()), 0.0), -reach) / factor
+    whole = (top - bottom) or 1.0
+    axes.set_xlim(bottom - 0.04 * whole if bottom < 0.0 else 0.0, bottom + _ROOM * whole)
+    counts = bool((values.medians[shown] == np.round(values.medians[shown])).all()) and factor == 1.0
+    axes.xaxis.set_major_locator(MaxNLocator(4, integer=counts) if top > bottom else FixedLocator([0.0]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.6g}"))
+    if bottom < 0.0:
+        axes.axvline(0.0, color=INK, linewidth=0.8)
+
+
 def _numbers(axes: Axes, values: Series, factor: float) -> None:
+    """Right of bar and whisker; where the whisker is cut, above it."""
+    low, high = axes.get_xlim()
+    limit = low + _ROOM_BEGINS * (high - low)
     for place, number in enumerate(values.numbers):
-        end = 0.0 if number is None else max(number.median, number.high, 0.0) / factor
         text = "not measured" if number is None else number.without_unit().short()
-        look: dict[str, Any] = {"fontsize": 9, "color": GREY if number is None else INK}
-        axes.annotate(text, (end, place), xytext=(5, 0), textcoords="offset points", va="center", **look)
+        end = 0.0 if number is None else max(number.median, number.high, 0.0) / factor
+        cut = end > limit
+        start = 0.0 if number is None else max(number.median, 0.0) / factor
+        look: dict[str, Any] = {"fontsize": 9, "color": GREY if number is None else INK, "va": "bottom" if cut else "center"}
+        axes.annotate(text, (start if cut else end, place), xytext=(5, 1 if cut else 0), textcoords="offset points", **look)
 
 
 def _safe(text: str) -> str:

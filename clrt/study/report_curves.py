@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.study.report_numbers import Number
-from clrt.study.report_plots import BLUE, GREEN, GREY, INK, ORANGE, NothingToDraw
+from clrt.study.report_plots import BLUE, GREEN, GREY, INK, ORANGE, NothingToDraw, halo
 from clrt.study.report_series import Rows, Series, rows_of
 from clrt.study.report_tables import slope_axis
 
@@ -186,7 +186,7 @@ def _shade(axes: Axes, floor: Number) -> None:
 def _label(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], texts: list[str]) -> None:
     """Beside each point, below and to the left of a falling curve, where the line does not run."""
     for a, b, text in zip(x, y, texts, strict=True):
-        axes.annotate(text, (a, b), xytext=(-7, -7), textcoords="offset points", ha="right", va="top", fontsize=9, color=INK)
+        halo(axes.annotate(text, (a, b), xytext=(-7, -7), textcoords="offset points", ha="right", va="top", fontsize=9, color=INK))
 
 
 def _log_axes(axes: Axes, x_name: str, y_name: str) -> None:

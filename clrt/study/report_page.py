@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clrt.study.report_pictures import Pictures
-from clrt.study.report_plots import GREY, INK, LINES, Plot
+from clrt.study.report_plots import GREY, GROUND, INK, LINES, Plot
 from clrt.study.report_tables import Section, header_lines, summary
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def inline_svg(plot: Plot) -> str:
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.S)
     text = re.sub(r'\bid="', f'id="{plot.key}-', text)
     text = re.sub(r'(xlink:href="#|url\(#)', rf"\1{plot.key}-", text)
-    for colour, name in ((INK, "ink"), (LINES, "lines"), (GREY, "grey")):
+    for colour, name in ((INK, "ink"), (LINES, "lines"), (GREY, "grey"), (GROUND, "ground")):
         text = text.replace(colour, f"var(--{name})")
     text = text.replace("fill: #ffffff", "fill: none")  # the ground is the page's
     return text.replace("<svg", f'<svg role="img" aria-labelledby="plot-{plot.key}-title"', 1)

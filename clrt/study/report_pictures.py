@@ -58,7 +58,7 @@ def read_pictures(folder: Path, precision: object) -> Pictures:
 
 def _full_scale(value: object) -> str:
     number = Number.of(value)
-    return f"{number.median:.3g}" if number else ""
+    return str(number) if number else ""
 
 
 def _bytes(folder: Path, file: str) -> bytes:

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
 
 #: Colours that people with any kind of colour vision tell apart (Okabe and Ito, 2008), on light and on dark ground.
 BLUE, ORANGE, GREEN, PURPLE, GREY = "#0072b2", "#d55e00", "#009e73", "#aa5c93", "#888888"
-INK, LINES = "#1f2328", "#d0d7de"  #: text and axes; grid. The page replaces both in a dark room
+INK, LINES, GROUND = "#1f2328", "#d0d7de", "#fefefe"  #: text and axes; grid; what is behind them. The page has its own in the dark
 INCHES = (6.2, 4.0)
 _DPI = 150
 _STYLE: dict[str, Any] = {
@@ -80,6 +81,13 @@ def _png(figure: Figure) -> bytes:
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=_DPI, metadata={"Software": None})
     return buffer.getvalue()
+
+
+def halo(axes_text: Text) -> None:
+    """Keeps a text readable where lines run behind it."""
+    from matplotlib.patheffects import withStroke
+
+    axes_text.set_path_effects([withStroke(linewidth=3, foreground=GROUND)])
 
 
 def all_plots(study: Mapping[str, Any]) -> list[Plot]:
