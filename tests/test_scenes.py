@@ -95,7 +95,7 @@ def test_scenes_show_their_effect_and_not_another() -> None:
     assert all(material.reflect == 0.0 for material in scene.materials)
 
 
-def test_first_picture_is_small_and_calls_for_every_effect() -> None:
+def test_first_picture_is_small_and_shows_what_it_should() -> None:
     path = SCENES / "first.txt"
     scene = load_scene(path)
     assert path.stat().st_size < 200_000
