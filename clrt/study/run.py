@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,9 +23,9 @@ from clrt.study import (
 from clrt.study.header import finish, header
 from clrt.study.plan import Plan
 from clrt.study.reference import Reference, reference_of
+from clrt.study.report import check_libraries
+from clrt.study.report import write as write_report
 from clrt.study.subject import Subject, Tell, open_subject
-
-_REPORT = "clrt.study.report"  #: the module that makes the tables and the page of a study's folder
 
 
 @dataclass(frozen=True)
@@ -100,6 +98,7 @@ def run_study(
     Raises SceneError, ClrtError, DeviceError, LimitError, OSError; before anything is written where the arguments are at fault.
     """
     check_folder(folder)
+    check_libraries()
     subject = open_subject(path, read, open_device(device), plan, folder, size, tell)
     head = header(subject)
     study = store.resumed(folder, head) if resume else store.empty(head)
@@ -119,11 +118,3 @@ def run_study(
 
 def _share(tell: Tell, done: float, share: float) -> Tell:
     return lambda phase, fraction: tell(phase, done + share * fraction)
-
-
-def write_report(folder: Path) -> list[Path]:
-    """study.md, study.html and plots, from the JSON alone; nothing where the report is not installed."""
-    if importlib.util.find_spec(_REPORT) is None:
-        return []
-    written: list[Path] = importlib.import_module(_REPORT).write(folder)
-    return written
