@@ -15,7 +15,8 @@ from clrt.cli import failure, streams
 from clrt.cli.paths import DEFAULT_SCENE
 
 #: a command and the module that has it, in the order of the help; imported when called for, so that `clrt --help` is quick
-_COMMANDS = {"render": "render", "explain": "explain", "study": "study", "devices": "devices", "verify": "verify", "convert": "scenes", "make": "scenes"}
+_COMMANDS = {"render": "render", "explain": "explain", "study": "study", "devices": "devices", "verify": "verify", "convert": "scenes",
+             "make": "scenes"}  # fmt: skip
 
 _HELP = """Render a scene text or a glTF model to a picture.
 

@@ -42,8 +42,9 @@ class _StudyProgress(PhaseProgress):
 @click.option("--right-handed", is_flag=True, help="Mirror x: for scenes made in right-handed axes.")
 @click.option("--split-objects", is_flag=True, help="Make each connected component an object, where the scene marks none.")
 @click.option("--allow-path", type=kinds.file, multiple=True, metavar="DIR", help="Permit the scene to name files in DIR, too.")
-@click.option("--compare", "compared", type=kinds.file, nargs=2, metavar="A B", help="Compare two studies instead: study.json files or folders.")
-@click.option("--json", "json_path", type=kinds.file_or_stdout, metavar="FILE", help="With --compare: write it as JSON; - for standard output.")
+@click.option("--compare", "compared", type=kinds.file, nargs=2, metavar="A B", help="Compare two studies instead: files or folders.")
+@click.option("--json", "json_path", type=kinds.file_or_stdout, metavar="FILE",
+              help="Write what --compare finds as JSON; - for standard output.")
 @click.option("-q", "--quiet", is_flag=True, help="Print no verdict and no progress.")
 def study(
     scene: Path | None, out: Path | None, compared: tuple[Path, Path] | None, json_path: Path | None, quiet: bool, **options: Any

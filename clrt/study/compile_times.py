@@ -1,7 +1,8 @@
-"""How long programs compile: with no cache, and with what that left in it. `python -m clrt.study.compile_times FILE` is the child process.
+"""How long programs compile: with no cache, and with what that left in it.
 
-PoCL reads the place of its cache once a process, so each measurement is a process of its own. It compiles all rungs, one after the other, in
-an order that turns from process to process; what it is given is a pickle that the parent wrote to its own temporary folder.
+The child process is `python -m clrt.study.compile_times FILE`. PoCL reads the place of its cache once a process, so each measurement
+is one of its own. It compiles the rungs one after the other, in an order that turns from process to process; what it is given is a
+pickle that the parent wrote to its own temporary folder.
 """
 
 from __future__ import annotations

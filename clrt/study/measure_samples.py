@@ -88,7 +88,7 @@ def _points(subject: Subject, shot: Shot, reference: Reference, levels: tuple[in
             found["rmse"][i].append(metrics.rmse(picture, truth))
             found["relative"][i].append(metrics.relative_mse(picture, truth))
             found["p99"][i].append(metrics.percentile_99(picture, truth))
-            seen = metrics.flip(picture, truth)
+            seen = metrics.flip(picture, truth) if seed < subject.plan.flip_seeds else None
             found["flip"][i] += [] if seen is None else [seen]
             errors[i].append((picture - truth).astype(np.float32))
     arrays = {name: np.array(values) for name, values in found.items()}
@@ -112,7 +112,7 @@ def _rows(points: Points) -> list[dict[str, Any]]:
         row: dict[str, Any] = {
             "samples": n, "seconds": measured(points.seconds[i].tolist(), "s"), "rmse": bootstrapped(points.rmse[i].tolist(), "radiance"),
             "relative_mse": bootstrapped(points.relative[i].tolist(), "1"), "p99": bootstrapped(points.p99[i].tolist(), "radiance"),
-            "flip": None if points.flip is None else bootstrapped(points.flip[i].tolist(), "1"),
+            "flip": None if points.flip is None else measured(points.flip[i].tolist(), "1"),
         }  # fmt: skip
         rows.append(row if points.flip is not None else {**row, "note": metrics.NO_FLIP})
     return rows

@@ -58,8 +58,8 @@ def measured(values: Sequence[float], unit: str) -> Number:
 def interval(values: Sequence[float]) -> tuple[float, float]:
     """Bounds of the median at 95%. Raises ValueError for fewer than two values.
 
-    From FEWEST values on whatever their distribution (`median_interval`). For fewer, which bound nothing without a law, mean -+ t s / sqrt(n)
-    of their logarithms, or of the values where one is not positive: right where these are about normal.
+    From FEWEST values on whatever their distribution (`median_interval`). For fewer, which bound nothing without a law, mean -+
+    t s / sqrt(n) of their logarithms, or of the values where one is not positive: right where these are about normal.
     """
     if len(values) >= FEWEST:
         return median_interval(values)

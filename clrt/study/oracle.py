@@ -44,6 +44,7 @@ def wrong_primitives(subject: Subject) -> Judged:
     if any(any(item.motion) for item in scene.objects):
         return Judged({}, "wrong primitives are not counted: objects move")
     try:
+        subject.tell("precision: programs of rays", 0.0)
         casters = {name: RayCaster(scene, precision=name, device=subject.device.info.name) for name in RUNGS}
     except MeshError as error:
         return Judged({}, f"wrong primitives are not counted: {error}")
@@ -62,8 +63,8 @@ def wrong_primitives(subject: Subject) -> Judged:
     prim, t = exact.first_hit(_triangles(scene), np.broadcast_to(scene.camera.eye, (len(chosen), 3)), rays[chosen])
     rows = {name: _judge(each[chosen], prim, t, end) for name, each in hits.items()}
     agreed = len(chosen) - int(np.count_nonzero(disputed < end))
-    return Judged(rows, f"wrong primitives: of {end:,} primary rays exact arithmetic decided all {len(chosen) - agreed:,} on which rungs differ, "
-                        f"and {agreed:,} others; spheres are left out")  # fmt: skip
+    note = f"wrong primitives: of {end:,} primary rays exact arithmetic decided all {len(chosen) - agreed:,} on which rungs differ"
+    return Judged(rows, f"{note}, and {agreed:,} others; spheres are left out")
 
 
 def _triangles(scene: Scene) -> FloatArray:

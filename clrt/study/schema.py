@@ -23,7 +23,8 @@ ROWS: dict[str, tuple[str, tuple[str, ...]]] = {
 }  # fmt: skip
 #: numbers of a part beside its rows
 LONE: dict[str, tuple[str, ...]] = {"samples": ("slope", "floor")}
-_HEADER = ("scene", "scene_sha256", "clrt", "date", "machine", "opencl", "build_options", "contraction", "load_average", "size", "quick", "seeds")
+_HEADER = ("scene", "scene_sha256", "clrt", "date", "machine", "opencl", "build_options", "contraction", "load_average", "size", "quick",
+           "seeds")  # fmt: skip
 _MACHINE = ("processor", "cores", "threads", "memory", "system")
 _OPENCL = ("platform", "device", "driver", "compiler")
 

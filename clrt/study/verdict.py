@@ -62,7 +62,7 @@ def _gain(row: Row, base: Row) -> str:
     gained = before["median"] - wrong["median"]
     if gained > 0:
         return f", and removes {gained:.0f} wrong primitives {wrong['unit']} ({wrong['median']:.0f} left)"
-    return f", and has {wrong['median']:.0f} wrong primitives {wrong['unit']}"
+    return f", and has {wrong['median']:.0f} wrong primitives {wrong['unit']}, fast {before['median']:.0f}"
 
 
 def _samples(study: dict[str, Any]) -> Iterator[str]:
@@ -94,7 +94,8 @@ def _bias(study: dict[str, Any]) -> Iterator[str]:
     found = study.get("bias")
     if isinstance(found, dict) and found["rows"]:
         known = found["verdict"]
-        yield "The mean over seeds is the reference's: no bias shows above its noise." if known == "unbiased" else f"The pictures are {known}."
+        clean = "The mean over seeds is the reference's: no bias shows above its noise."
+        yield clean if known == "unbiased" else f"The pictures are {known}."
 
 
 def _depth(study: dict[str, Any]) -> Iterator[str]:
@@ -113,7 +114,7 @@ def _depth(study: dict[str, Any]) -> Iterator[str]:
 
 
 def _effects(study: dict[str, Any]) -> Iterator[str]:
-    rows = [row for row in _rows(study, "effects") if row["cost"]["low"] > 0.0]
+    rows = [row for row in _rows(study, "effects") if row.get("cost") and row["cost"]["low"] > 0.0]
     for row in sorted(rows, key=lambda row: -float(row["cost"]["median"]))[:2]:
         part, changed = row["share_of_time"]["median"], row["changed_pixels"]["median"]
         yield (f"The effect {row['effect']} costs {_milliseconds(row['cost'])}, {part:.0%} of the time; without it {changed:.0%} of the "
