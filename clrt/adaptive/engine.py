@@ -19,7 +19,8 @@ from clrt.adaptive.schedule import Walk
 IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
 
-PILOT = 0.05  #: of the whole that is spent when the forecast is made
+PILOT = 0.05  #: of the whole that is spent when the forecast is made, where noise was seen to fall ...
+_BLIND_PILOT = 0.2  #: ... and where too few tiles had two levels more than the first to tell how fast it does
 MOST_SAMPLES = 1 << 20  #: of a pixel
 _CHUNK_S = 0.1  #: launches are to take about this long, so that Ctrl-C and progress come between them
 _FIRST_TILES = 32  #: in the first launch, whose speed is not known yet
@@ -71,6 +72,7 @@ class Engine:
         self.flat: IntArray = np.zeros(0, np.int64)  #: tiles without an edge, that keep one sample
         self.ledger = Ledger(self.grid, 1 if goal.samples is None else goal.samples // REPLICATES)
         self.forecast: Forecast | None = None
+        self.overhead = replicates.overhead() * REPLICATES  #: seconds of the launches of one sample
 
     @property
     def spent(self) -> float:
@@ -132,7 +134,7 @@ class Engine:
             part, begin = tiles[at : at + size], time.perf_counter()
             self.replicates.run(part, 0, self.ledger.first, range(i, i + 1))
             seconds = time.perf_counter() - begin
-            self.cost[part] += seconds / len(part) / self.ledger.first
+            self.cost[part] += max(seconds - self.overhead / REPLICATES, 0.1 * seconds) / len(part) / self.ledger.first
             at += len(part)
             size = max(8, min(8 * size, int(_CHUNK_S / max(seconds / len(part), 1e-9))))
 
@@ -150,13 +152,13 @@ class Engine:
             while same.size:
                 seconds = np.cumsum(self.cost[same]) * samples
                 part = same[: max(1, int(np.searchsorted(seconds, min(_CHUNK_S, self._left()))))]
-                if float(self.cost[part].sum()) * samples > self._left():
+                if (float(self.cost[part].sum()) + self.overhead) * samples > self._left():
                     return False
                 begin = time.perf_counter()
                 self.replicates.run(part, samples, 2 * samples)
                 for few in _parts(part, _READ_TILES):
                     self._look(few, level + 1)
-                self._learn(part, (time.perf_counter() - begin) / samples)
+                self._learn(part, (time.perf_counter() - begin) / samples - self.overhead)
                 same = same[len(part) :]
                 self.tell(self._fraction())
         return True
@@ -164,7 +166,7 @@ class Engine:
     def _learn(self, tiles: IntArray, seconds: float) -> None:
         """Halfway from what was known of the cost of these tiles to what they took together."""
         before = float(self.cost[tiles].sum())
-        self.cost[tiles] *= 0.5 * (1.0 + seconds / before) if before > 0.0 else 1.0
+        self.cost[tiles] *= 0.5 * (1.0 + max(seconds / before, 0.1)) if before > 0.0 else 1.0
 
     def _met(self, half: int) -> bool:
         if self.forecast is None:
@@ -175,8 +177,8 @@ class Engine:
     def _foretell(self) -> None:
         """The forecast, as soon as PILOT of the whole is done."""
         seconds = None if self.goal.deadline is None else self.spent + max(self._left(), 0.0)
-        found = Outlook(self.ledger, self.walk, self.cost, self.spent).forecast(self.goal.error, seconds)
-        if self.spent >= PILOT * found.seconds.value:
+        found = Outlook(self.ledger, self.walk, self.cost, self.overhead, self.spent).forecast(self.goal.error, seconds)
+        if self.spent >= (PILOT if len(self.ledger.noise) > 2 else _BLIND_PILOT) * found.seconds.value:
             self.forecast = as_told(found, self.goal.error)
             self.foretell(self.forecast)
 
@@ -186,8 +188,11 @@ class Engine:
 
     def _outcome(self, met: bool) -> Outcome:
         levels = self.walk.swapped
-        pixels, error = self.ledger.picture(levels)
-        return Outcome(pixels, error, self.ledger.error(levels), self._samples(), self.forecast, met)
+        pixels, standard_error = self.ledger.picture(levels)
+        error = self.ledger.error(levels)
+        if self.goal.error is not None:
+            met = met and error.value <= self.goal.error
+        return Outcome(pixels, standard_error, error, self._samples(), self.forecast, met)
 
     def _samples(self) -> tuple[int, float, int]:
         """Of a pixel that were traced, also those that only decided."""

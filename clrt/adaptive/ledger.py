@@ -12,6 +12,7 @@ from clrt.adaptive.replicates import HALF, Grid
 IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
 
+_STEEP = 2.0  #: power of n by which what neighbours show at level 0 loses its say
 _HALVES = np.arange(2)[:, None]
 #: Variance of ((a + b) / 2 - mu)^2 about its estimate (u_a + u_b) / 4, in squares of u, the variance of one half's mean: the parts
 #: ((a - mu)^2 - u_a) / 4, the same of b, and (a - mu) (b - mu) / 2 are uncorrelated and have 2 u^2 n / (n - 1) / 16 twice and u^2 / 4.
@@ -36,6 +37,7 @@ class Ledger:
         self.square: list[FloatArray] = []
         self.product: list[FloatArray] = []
         self.bad = np.zeros(grid.count, np.int64)
+        self._first: dict[int, FloatArray] = {}
         self._blocks: list[list[Moments]] = []
         self._block: list[IntArray] = []
         self._row: list[IntArray] = []
@@ -66,7 +68,16 @@ class Ledger:
     def priority(self, half: int, levels: IntArray) -> FloatArray:
         """(tiles,): a half's variance of a pixel's mean over what that mean cost, a sample being 1: where a sample brings most."""
         noise = np.stack(self.noise)[levels, half, np.arange(self.grid.count)]
+        noise = np.maximum(noise, self._around(half) * 2.0 ** (-_STEEP * levels))
         return np.asarray(noise / (self.grid.pixels * 3.0 * self.samples(levels)))
+
+    def _around(self, half: int) -> FloatArray:
+        """(tiles,): what is to be expected of a tile that showed less at level 0 than those around it: half their mean."""
+        if half not in self._first:
+            noise = np.pad((self.noise[0][half] / self.grid.pixels).reshape(self.grid.rows, self.grid.columns), 1, mode="edge")
+            mean = sum(noise[j : j + self.grid.rows, i : i + self.grid.columns] for j in range(3) for i in range(3)) / 9.0
+            self._first[half] = np.asarray(mean).ravel() * self.grid.pixels / 2.0
+        return self._first[half]
 
     def half_error(self, half: int, levels: IntArray) -> Interval:
         """Relative error of the picture, were both halves sampled as this one, and judged by this one alone; levels : (tiles,)."""

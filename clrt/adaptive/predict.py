@@ -13,8 +13,11 @@ from clrt.adaptive.schedule import Walk, threshold
 
 FloatArray = NDArray[np.float64]
 
-_SLOPES = (0.5, 3.0)  #: a variance falls at least as n^-0.5 (less is a matter of chance) and at most as n^-3 (Owen 1997: smooth integrands)
-_USUAL = 1.25  #: where nothing is known yet: between random samples (1) and those of an edge (1.5)
+_SLOPES = (0.7, 3.0)  #: a variance falls about as n^-1 (less is a matter of chance) and at most as n^-3 (Owen 1997: smooth integrands)
+_USUAL = 2.2  #: where nothing is known yet
+#: Slopes begin steep, while more and more of a pixel's parts get a sample each, and fall towards those of random samples, as far as the
+#: light depends on pairs of dimensions that are stratified apart: slope - LAST by the factor FADE a level, in the mean of seven scenes.
+_LAST, _FADE = 1.1, 0.65
 _PACE = 0.1  #: relative: how well the time of a sample is known
 _SLOPE = 0.12  #: of a slope's change from the pilot to the end, measured over the scenes of docs/error.md
 _MOST_STEPS = 400
@@ -30,11 +33,14 @@ class Forecast:
 
 @dataclass(frozen=True)
 class Outlook:
-    """The state from which a render goes on. cost : (tiles,) seconds of one sample of all replicates; spent : seconds so far."""
+    """The state from which a render goes on. cost : (tiles,) seconds of one sample of all replicates, and `overhead` those of its
+    launches, whatever the tiles; spent : seconds so far.
+    """
 
     ledger: Ledger
     walk: Walk
     cost: FloatArray
+    overhead: float
     spent: float
 
     def forecast(self, error: float | None, seconds: float | None) -> Forecast:
@@ -86,9 +92,11 @@ class Outlook:
                 break
             while (up := (noise / (size * ledger.samples(levels)) > threshold(step)) & (2 * ledger.samples(levels) <= walk.most)).any():
                 levels += up
-                noise = np.where(up, noise * 2.0**-slopes, noise)
+                ahead = levels - walk.levels
+                noise = np.where(up, noise * 2.0 ** -(_LAST + (slopes - _LAST) * _FADE**ahead), noise)
             higher = np.maximum(there, levels.max(0))
-            time += pace * float(np.sum(self.cost * (ledger.samples(higher) - ledger.samples(there))))
+            rising = [int(ledger.samples(level)) for level in range(int(higher.max())) if ((there <= level) & (higher > level)).any()]
+            time += pace * (float(np.sum(self.cost * (ledger.samples(higher) - ledger.samples(there)))) + self.overhead * sum(rising))
             there = higher
             reached = float(np.sqrt(noise.sum() / 4.0 / scale))
             if seconds is not None and time > seconds:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -59,8 +60,8 @@ class Grid:
 class Replicates:
     """The sums of all replicates, each of the same number of samples in a tile. `tracer` renders a scene with the feature "sampling"."""
 
-    def __init__(self, tracer: Tracer) -> None:
-        """Raises LimitError where the device has no room for the sums."""
+    def __init__(self, tracer: Tracer, seed: int | None = None) -> None:
+        """seed : instead of the scene's own. Raises LimitError where the device has no room for the sums."""
         buffers = tracer.buffers
         self.tracer, self.queue = tracer, buffers.device.queue
         self.grid = Grid(tracer.width, tracer.height)
@@ -71,7 +72,7 @@ class Replicates:
                 f"has {there >> 20:,} MiB; take a smaller picture, or --samples without --stderr"
             )
         self.sums = [buffers.empty(size) for _ in range(REPLICATES)]
-        self.frames = [self._frame(seed) for seed in replicate_seeds(buffers.packed.scene.seed)]
+        self.frames = [self._frame(word) for word in replicate_seeds(buffers.packed.scene.seed if seed is None else seed)]
         self.launches: list[tuple[IntArray, int, int, int]] = []  #: tiles, first and last but one sample, replicate
 
     def _frame(self, seed: int) -> Any:
@@ -96,6 +97,17 @@ class Replicates:
         kept, self.frames[0] = self.frames[0], self.tracer.buffers.upload(record)
         self.run(tiles, 0, 1, range(1))
         self.frames[0] = kept
+
+    def overhead(self) -> float:
+        """Seconds that a launch takes whatever it traces: that of a tile beside the picture, the least of a few."""
+        beside = self.tracer.buffers.upload(np.array([0, 0, 1, self.grid.width, self.grid.height], np.int32))
+        seconds = []
+        for _ in range(8):
+            begin = time.perf_counter()
+            self.tracer.run_tiles(self.frames[0], {"sample_range": beside, "sample_sums": self.sums[0]}, 1)
+            self.queue.finish()
+            seconds.append(time.perf_counter() - begin)
+        return min(seconds)
 
     def values(self, tiles: IntArray, samples: int) -> FloatArray:
         """(REPLICATES, n, th, tw, 3): means over `samples` samples; numbers beside the picture are those at its edge."""

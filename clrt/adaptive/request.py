@@ -14,6 +14,7 @@ from clrt.adaptive.replicates import REPLICATES, Replicates
 from clrt.device.session import Tracer
 from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
+from clrt.features.camera import SAMPLES
 from clrt.stats import RunStats
 
 ERRORS = (1e-6, 1.0)  #: that may be asked for
@@ -70,7 +71,7 @@ class Request:
 
     def contrast(self, features: Features) -> float | None:
         """Where edges alone are refined: nothing but the place in the pixel is drawn."""
-        if self.split or any(f.sampled for f in features.active):
+        if self.split or any(f.sampled and f is not SAMPLES for f in features.active):
             return None
         return self.error if self.error is not None else _CONTRAST
 

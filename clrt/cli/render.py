@@ -79,7 +79,7 @@ _AFTER_S, _AFTER_PIXEL_S = 0.2, 6e-8
     "--error",
     type=kinds.fraction,
     metavar="E",
-    help="Sample until the picture's relative error (root mean square over pixels, over the picture's mean) is below E, such as 0.01, with 95%.",
+    help="Sample until the relative error (root mean square over pixels, over the picture's mean) is below E, such as 0.01, with 95%.",
 )
 @click.option("--within", type=kinds.duration, metavar="T", help="The best picture in this time, such as 5s or 2min, compiling included.")
 @click.option("--stderr", type=kinds.file, metavar="FILE", help="Write a map of each pixel's standard error, too: .png or .exr.")
