@@ -9,7 +9,7 @@ from typing import Any
 from clrt.study.report_plots import Plot
 from clrt.study.report_tables import Section, Table, header_lines, summary
 
-_SPECIAL = re.compile(r"([\\*_\[\]<>|&#])")  # not the backquote: notes have `words` of the program in them
+_SPECIAL = re.compile(r"([\\*\[\]<>|&]|(?<!\w)_|_(?!\w))")  # not the backquote: notes have `words` of the program in them
 
 
 def markdown(study: Mapping[str, Any], parts: Sequence[Section], plots: Sequence[Plot]) -> str:

@@ -108,7 +108,7 @@ def _step(size: float, steps: tuple[tuple[float, str], ...], least: tuple[float,
 def _places(median: float, low: float, high: float) -> int:
     """Digits after the point: to the first digit of the half width of the interval, within the bounds above."""
     half = (high - low) / 2.0
-    size = max(abs(median), half)
+    size = abs(median) or half
     lead = math.floor(math.log10(size)) if size > 0.0 else None
     if half <= 0.0:
         whole = math.isclose(median, round(median), rel_tol=1e-12)

@@ -44,7 +44,7 @@ class Series:
     def axis(self) -> tuple[float, str]:
         """What medians and intervals are divided by to be drawn, and the unit that the axis then has, empty where it has none."""
         known = [n for n in self.numbers if n]
-        factor, unit = max(known, key=lambda n: max(abs(n.high), abs(n.median))).factor if known else (1.0, "")
+        factor, unit = max(known, key=lambda n: abs(n.median)).factor if known else (1.0, "")
         return factor, "" if unit in ("", "1", "x") else unit.replace("^2", "²")
 
     def whiskers(self, where: NDArray[np.bool_], scale: float = 1.0) -> NDArray[np.float64]:
