@@ -34,24 +34,24 @@ def lamp_over_floor() -> Scene:
     return replace(s, samples_line=1, samples=2)
 
 
-def soft_shadow() -> Scene:
+def soft_shadow(fov: float = 45.0) -> Scene:
     """A ball's shadow from a triangular lamp on a floor, and light all over from elsewhere."""
     lamp_at = np.array([[(-0.5, 3.0, -0.5), (0.5, 3.0, -0.5), (0.0, 3.0, 0.6)]], np.float64)
     floor = quad((-9, 0, -9), (9, 0, -9), (9, 0, 9), (-9, 0, 9))
     parts = objects((lamp_at, 1), (floor, 0))
     s = scene(parts, [Material((0.9, 0.8, 0.6), 0.1, 0.6, 0.0, 1.0), lamp(8.0, 8.0, 8.0), matte(diffuse=0.7)], [],
-              spheres((0.0, 0.7, 0.0, 0.4, 2)), eye=(0, 2.2, -4), view=(0, -0.55, 1), fov=45.0, size=SIZE)  # fmt: skip
+              spheres((0.0, 0.7, 0.0, 0.4, 2)), eye=(0, 2.2, -4), view=(0, -0.55, 1), fov=fov, size=SIZE)  # fmt: skip
     return replace(s, samples_line=1, samples=2)
 
 
-def lens_blur() -> Scene:
+def lens_blur(fov: float = 40.0, radius: float = 0.08) -> Scene:
     """A dark and a bright board, in front of and behind the plane of focus, before a grey one."""
     near, far = quad((-0.8, -0.3, 1.5), (-0.1, -0.3, 1.5), (-0.1, 0.9, 1.5), (-0.8, 0.9, 1.5)), quad(
         (0.2, -0.9, 4.0), (1.6, -0.9, 4.0), (1.6, 0.6, 4.0), (0.2, 0.6, 4.0))  # fmt: skip
     back = quad((-9, -9, 8.0), (9, -9, 8.0), (9, 9, 8.0), (-9, 9, 8.0))
     shades = [Material((c, c, c), 1.0, 0.0, 0.0, 1.0) for c in (0.2, 1.0, 0.5)]
-    s = scene(objects((near, 0), (far, 1), (back, 2)), shades, [(0, 0, -5)], None, eye=(0, 0, 0), view=(0, 0, 1), fov=40.0, size=SIZE)
-    return replace(s, samples_line=1, samples=2, lens=Lens(0.08, 2.5, line=1))
+    s = scene(objects((near, 0), (far, 1), (back, 2)), shades, [(0, 0, -5)], None, eye=(0, 0, 0), view=(0, 0, 1), fov=fov, size=SIZE)
+    return replace(s, samples_line=1, samples=2, lens=Lens(radius, 2.5, line=1))
 
 
 def rare_flashes() -> Scene:

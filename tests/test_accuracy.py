@@ -161,13 +161,13 @@ def test_error_map_says_what_white_is(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("error", [0.0, -0.1, 1.0, 2.0, float("nan"), float("inf")])
 def test_errors_out_of_range_are_refused(error: float) -> None:
-    with pytest.raises(LimitError, match="an error of .* is out of range"):
+    with pytest.raises(LimitError, match=r"an error of .* is out of range"):
         Request.of(error, None, None, False, None)
 
 
 @pytest.mark.parametrize("within", [0.0, -1.0, float("nan"), 1e9])
 def test_times_out_of_range_are_refused(within: float) -> None:
-    with pytest.raises(LimitError, match="a time of .* is out of range"):
+    with pytest.raises(LimitError, match=r"a time of .* is out of range"):
         Request.of(None, within, None, False, None)
 
 

@@ -69,7 +69,6 @@ class Engine:
         self.grid = replicates.grid
         self.start = time.perf_counter()
         self.cost: FloatArray = np.zeros(self.grid.count)  #: seconds of one sample of a tile, all replicates
-        self.flat: IntArray = np.zeros(0, np.int64)  #: tiles without an edge, that keep one sample
         self.ledger = Ledger(self.grid, 1 if goal.samples is None else goal.samples // REPLICATES)
         self.forecast: Forecast | None = None
         self.overhead = replicates.overhead() * REPLICATES  #: seconds of the launches of one sample
@@ -114,7 +113,7 @@ class Engine:
         for part in _parts(tiles[~edge], _READ_TILES):
             rows, columns, inside = self.grid.places(part)
             self.ledger.put(part, 0, flat(picture[rows, columns], inside))
-        self.flat = tiles[~edge]
+        self.ledger.closed[tiles[~edge]] = True
         return np.asarray(tiles[edge])
 
     def _pilot(self, tiles: IntArray) -> int:
@@ -191,7 +190,7 @@ class Engine:
         pixels, standard_error = self.ledger.picture(levels)
         error = self.ledger.error(levels)
         if self.goal.error is not None:
-            met = met and error.value <= self.goal.error
+            met = met and bool(error.value <= self.goal.error)
         return Outcome(pixels, standard_error, error, self._samples(), self.forecast, met)
 
     def _samples(self) -> tuple[int, float, int]:
@@ -199,7 +198,7 @@ class Engine:
         count = self.ledger.samples(self.ledger.reached) * REPLICATES
         if self.contrast is not None:
             count = count + 1
-            count[self.flat] = 1
+            count[self.ledger.closed] = 1
         return int(count.min()), float((count * self.grid.pixels).sum() / self.grid.pixels.sum()), int(count.max())
 
     def _short(self, taken: int) -> Outcome:

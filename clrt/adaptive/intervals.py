@@ -28,7 +28,7 @@ class Interval:
 
     def to_json(self) -> dict[str, float | None]:
         """JSON has no infinity: an end that is not known is null."""
-        return {name: x if x < inf else None for name, x in (("value", self.value), ("low", self.low), ("high", self.high))}
+        return {name: float(x) if x < inf else None for name, x in (("value", self.value), ("low", self.low), ("high", self.high))}
 
 
 def f_quantile(z: float, first: float, second: float) -> float:

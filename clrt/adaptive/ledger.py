@@ -37,6 +37,7 @@ class Ledger:
         self.square: list[FloatArray] = []
         self.product: list[FloatArray] = []
         self.bad = np.zeros(grid.count, np.int64)
+        self.closed = np.zeros(grid.count, bool)  #: tiles that are not to be sampled further
         self._first: dict[int, FloatArray] = {}
         self._blocks: list[list[Moments]] = []
         self._block: list[IntArray] = []
@@ -69,7 +70,7 @@ class Ledger:
         """(tiles,): a half's variance of a pixel's mean over what that mean cost, a sample being 1: where a sample brings most."""
         noise = np.stack(self.noise)[levels, half, np.arange(self.grid.count)]
         noise = np.maximum(noise, self._around(half) * 2.0 ** (-_STEEP * levels))
-        return np.asarray(noise / (self.grid.pixels * 3.0 * self.samples(levels)))
+        return np.where(self.closed, 0.0, noise / (self.grid.pixels * 3.0 * self.samples(levels)))
 
     def _around(self, half: int) -> FloatArray:
         """(tiles,): what is to be expected of a tile that showed less at level 0 than those around it: half their mean."""

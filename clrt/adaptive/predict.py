@@ -86,11 +86,12 @@ class Outlook:
         margin = now.high / now.value if now.value > 0.0 and now.high < np.inf else 1.0
         there, time = ledger.reached.copy(), self.spent
         size = ledger.grid.pixels * 3.0
+        most = np.where(ledger.closed, 0, walk.most)
         best = (time, float(np.sqrt(noise.sum() / 4.0 / scale)))
         for step in range(walk.step + 1, walk.step + 1 + _MOST_STEPS):
             if error is not None and best[1] * margin <= error:
                 break
-            while (up := (noise / (size * ledger.samples(levels)) > threshold(step)) & (2 * ledger.samples(levels) <= walk.most)).any():
+            while (up := (noise / (size * ledger.samples(levels)) > threshold(step)) & (2 * ledger.samples(levels) <= most)).any():
                 levels += up
                 ahead = levels - walk.levels
                 noise = np.where(up, noise * 2.0 ** -(_LAST + (slopes - _LAST) * _FADE**ahead), noise)
