@@ -7,7 +7,7 @@ SCENE ?= scenes/first.txt
 PICTURE ?= out/$(basename $(notdir $(SCENE))).png
 
 .DEFAULT_GOAL := help
-.PHONY: help run test test-all lint bench docs clean
+.PHONY: help run test test-all lint bench study docs clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -29,6 +29,9 @@ lint: $(VENV)/dev.stamp ## ruff and mypy
 bench: $(VENV)/bench.stamp ## measure, into bench-results/; BENCH=--write-docs fills the tables of the documentation
 	$(BIN)/python -m clrt.bench $(BENCH)
 
+study: $(VENV)/study.stamp ## study six scenes, into study-results/ and docs/accuracy.md; STUDY=--quick into out/study alone
+	$(BIN)/python -m clrt.study.project $(STUDY)
+
 docs: $(VENV)/bench.stamp ## fill the tables of the documentation: the hard cases, then what `make bench` measures; many minutes
 	$(BIN)/clrt verify --markdown docs/numerics.md
 	$(BIN)/python -m clrt.bench --write-docs
@@ -42,6 +45,7 @@ clean: ## remove .venv, out/ and caches
 $(VENV)/run.stamp: EXTRA := mesh
 $(VENV)/dev.stamp: EXTRA := dev
 $(VENV)/bench.stamp: EXTRA := bench
+$(VENV)/study.stamp: EXTRA := study
 
 $(VENV)/%.stamp: pyproject.toml $(VENV)/made.stamp
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[$(EXTRA)]'
