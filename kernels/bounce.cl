@@ -14,9 +14,17 @@ typedef struct {
     int count;
 } BounceStack;
 
+// Kinds of rays that go on from a hit, each at most once.
+#define BRANCH_REFLECTED 1
+#define BRANCH_REFRACTED 2
+#define BRANCH_PASSED 3
+#define BRANCH_SCATTERED 4
+#define BRANCH_SHONE 5
+#define BRANCH_MATTE 6
+
 // Puts `direction` from the hit point on the stack for the lanes in `active`, starting on the side that it points to; gives its place there.
 HOT Bounce *bounce_push(const Geometry *geometry, const Rays *rays, BounceStack *stack, const Hit *hit, const real_n *direction,
-                        real_n weight, mask_n active, const Bounce *from) {
+                        real_n weight, mask_n active, const Bounce *from, const uint branch) {
     Bounce *next = stack->entry + stack->count;
     if (!any_lane(active)) return next;
     stack->count++;
@@ -84,7 +92,8 @@ HOT void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
             real_n direction[3];
             bounce_reflected(&rays, &hit, direction);
             //@ reflected_drawn
-            bounce_push(&geometry, &rays, &bounces, &hit, direction, weight * reflected, is_greater(weight * reflected, (real_n)0), &current);
+            bounce_push(&geometry, &rays, &bounces, &hit, direction, weight * reflected, is_greater(weight * reflected, (real_n)0), &current,
+                        BRANCH_REFLECTED);
             //@ reflected_pushed
         }
 //@end

@@ -35,9 +35,9 @@ HOT void fog_mote(global const Frame *frame, const Draws *draws, const uint path
 //@hook arrived
         if (HAVE_FOG) {
             real_n fog_weight[3] = {weight, weight, weight}, misty[3] = {(real_n)0, (real_n)0, (real_n)0};
-            //@ fog_tint
             Hit mote = {{0}};
             fog_mote(frame, &draws, path, &rays, hits.t, weight, &mote);
+            //@ fog_tint
             if (any_lane(mote.found)) {
                 //@ fog_lights
             }

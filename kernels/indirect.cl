@@ -86,10 +86,11 @@ HOT real_n indirect_scatter(global const Material *materials, const Draws *draws
                 for (int a = 0; a < 3; a++) left[a] /= stays;
             }
             if (any_lane(kept)) {
-                Bounce *drawn = bounce_push(&geometry, &rays, &bounces, &hit, direction, weight, kept, &current);
+                Bounce *drawn = bounce_push(&geometry, &rays, &bounces, &hit, direction, weight, kept, &current, BRANCH_SCATTERED);
                 for (int a = 0; a < 3; a++) drawn->tint[a] = left[a];
                 //@counting count_rays(counters, COUNT_INDIRECT, kept);
                 //@ drawn_pushed
+                //@ scattered_pushed
             }
         }
 //@end
@@ -98,6 +99,8 @@ HOT real_n indirect_scatter(global const Material *materials, const Draws *draws
     if (HAVE_INDIRECT && goes_on) {
         real_n scatter_exponent, highlight;
         indirect_total(materials, hit, &scatter_exponent, &highlight);
-        amount *= mis_share(chance, indirect_density(rays, hit, to_light, scatter_exponent, highlight));
+        real_n density = indirect_density(rays, hit, to_light, scatter_exponent, highlight);
+        //@ scattered_density
+        amount *= mis_share(chance, density);
     }
 //@end

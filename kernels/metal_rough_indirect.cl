@@ -27,10 +27,11 @@
                 for (int a = 0; a < 3; a++) left[a] /= stays;
             }
             if (any_lane(kept)) {
-                Bounce *drawn = bounce_push(&geometry, &rays, &bounces, &hit, direction, weight, kept, &current);
+                Bounce *drawn = bounce_push(&geometry, &rays, &bounces, &hit, direction, weight, kept, &current, BRANCH_MATTE);
                 for (int a = 0; a < 3; a++) drawn->tint[a] = left[a];
                 //@counting count_rays(counters, COUNT_INDIRECT, kept);
                 //@ drawn_pushed
+                //@ scattered_pushed
             }
         }
 //@end
@@ -39,6 +40,8 @@
     if (HAVE_INDIRECT && goes_on) {
         const real_n cosine = dot_n(hit->normal, to_light), drawn = cosine * R(0.318309886183790672);
         const mask_n could = is_greater(cosine, (real_n)0) & is_greater(dot_n(hit->geometric, to_light), (real_n)0);
-        matte *= mis_share(chance, choose(could, drawn, (real_n)0));
+        real_n density = choose(could, drawn, (real_n)0);
+        //@ scattered_density
+        matte *= mis_share(chance, density);
     }
 //@end

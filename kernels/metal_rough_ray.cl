@@ -21,7 +21,7 @@
             const mask_n kept = is_greater(left, (real_n)0);
             //@counting count_rays(counters, COUNT_GLOSS, kept);
             if (any_lane(kept)) {
-                Bounce *shone = bounce_push(&geometry, &rays, &bounces, &hit, direction, left, kept, &current);
+                Bounce *shone = bounce_push(&geometry, &rays, &bounces, &hit, direction, left, kept, &current, BRANCH_SHONE);
                 for (int a = 0; a < 3; a++) shone->tint[a] = shine[a];
                 //@ shone_pushed
             }

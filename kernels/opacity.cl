@@ -26,7 +26,7 @@ HOT real_n opacity_solid(const Geometry *geometry, global const Material *materi
                 //@counting count_rays(counters, COUNT_PASSED, goes_on);
                 if (any_lane(goes_on)) {
                     const real_n way = hits.t;
-                    Bounce *passed = bounce_push(&geometry, &rays, &bounces, &hit, rays.direction, straight, goes_on, &current);
+                    Bounce *passed = bounce_push(&geometry, &rays, &bounces, &hit, rays.direction, straight, goes_on, &current, BRANCH_PASSED);
                     //@ passed_pushed
                 }
             }

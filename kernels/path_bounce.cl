@@ -8,9 +8,9 @@
     current.path = 1;
 //@end
 //@hook bounce_pushed
-    // The place on the stack sets what goes on from the same hit apart. The factor is odd (2^32 over the golden ratio): no two numbers fall together
-    // along a way.
-    next->path = from->path * 0x9e3779b1u + (uint)stack->count;
+    // Its kind sets what goes on from the same hit apart, whatever other lanes do. The factor is odd (2^32 over the golden ratio): no two numbers fall
+    // together along a way.
+    next->path = from->path * 0x9e3779b1u + branch;
 //@end
 //@hook next
         path = current.path;

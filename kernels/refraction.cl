@@ -175,6 +175,7 @@ static inline void refraction_turn(global const Material *materials, global cons
             //@counting count_rays(counters, COUNT_REFRACTED, is_greater(passed * weight, (real_n)0));
             //@counting count_rays(counters, COUNT_INTERNAL, is_greater(internal * weight, (real_n)0));
             //@ refraction_sent
-            bounce_push(&geometry, &rays, &bounces, &hit, through, weight * passed, is_greater(passed * weight, (real_n)0), &current)->media = behind;
+            bounce_push(&geometry, &rays, &bounces, &hit, through, weight * passed, is_greater(passed * weight, (real_n)0), &current,
+                        BRANCH_REFRACTED)->media = behind;
             reflected += internal;
 //@end

@@ -71,6 +71,24 @@ def test_fog_behind_what_lets_light_through_is_that_of_the_reference() -> None:
     assert_same(device_batches(scene, 32, range(8)), reference.mean, reference.variance_of_mean)
 
 
+def test_light_scattered_in_absorbing_glass_is_absorbed_to_the_place() -> None:
+    """The eye and a lamp in a ball of glass that swallows red: the integral has exp(-a x) besides the fog's own exponentials."""
+    density, absorb = 0.3, 1.0
+    text = "E -0.5 0 0\nV 1 0 0\nF 0.01\nR 4 4\nL 0 0.7 0\nM 0 0 0  0 0 0 1 0 1 1\nabsorb 1 0 0\nS 0 0 0 2\ndepth 1\nfog 0.3\n"
+    pictures = device_batches(parse_scene(text), 256, range(12)).mean((1, 2))
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    x = 1.25 * (nodes + 1.0)  # to the ball's wall
+    d = np.hypot(-0.5 + x, 0.7)
+    inside = np.pi / (4 * np.pi) * density * np.exp(-density * (x + d))
+    red, green = 1.25 * (weights * inside * np.exp(-absorb * x)).sum(), 1.25 * (weights * inside).sum()
+    error = pictures.std(axis=0, ddof=1) / np.sqrt(len(pictures))
+    mean = pictures.mean(axis=0)
+    assert error[0] < 0.02 * red
+    assert abs(mean[0] - red) < 4.0 * error[0]
+    # Green goes on behind the wall: more than what is scattered inside.
+    assert mean[1] > green - 4.0 * error[1]
+
+
 def test_nothing_comes_from_infinitely_far_away() -> None:
     text = "E 0 0 -3\nV 0 0 1\nF 40\nR 4 4\nbackground 1 1 1\nsun 0 0 -1\nM 1 1 1  0 1 0 1 0\nS 0 0 0 0.5\nfog 0.1\n"
     scene = parse_scene(text)

@@ -22,7 +22,8 @@ def emitters(packed: Packed) -> NDArray[np.void]:
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     records["corner"], records["e1"], records["e2"] = corner, e1, e2
     records["normal"] = np.divide(normal, length, where=length > 0.0, out=np.zeros_like(normal))
-    records["radiance"], records["luminance"], records["area"] = found.radiance, found.luminance, found.area
+    records["radiance"] = found.radiance * found.part[:, None]
+    records["luminance"], records["area"] = found.luminance, found.area
     records["radius"] = found.radius
     total = np.cumsum(found.power)
     records["sum"] = total / total[-1]

@@ -57,6 +57,7 @@ PATH = Feature("path", _any_of(_DRAWING), "path.cl", helper=True)
 PATH_BOUNCE = Feature("path bounce", _all_of(PATH, BOUNCE), "path_bounce.cl", helper=True)
 THROUGHPUT = Feature("throughput", _any_of(_TINTING), "throughput.cl", helper=True)
 FOG_TINT = Feature("fog tint", _all_of(volume.FOG, THROUGHPUT), "fog_tint.cl", helper=True)
+FOG_ABSORPTION = Feature("fog absorption", _all_of(volume.FOG, surfaces.ABSORPTION), "fog_absorb.cl", helper=True)
 ADDED = Feature("added", _any_of((*_ADDING, _all_of(rough.GLOSS, _any_of(_LIGHT_DRAWING)))), "added.cl", helper=True)
 REACH = Feature("reach", _any_of(_REACHING), "reach.cl", helper=True)
 SCATTER = Feature("scatter", _any_of(_LIGHT_DRAWING), "scatter.cl", helper=True)
@@ -67,12 +68,14 @@ FACETS = Feature(
 MIS = Feature("mis", _all_of(_any_of(_LIGHT_DRAWING), _any_of(_RAY_DRAWING)), "mis.cl", helper=True)
 #: surfaces that let light samples through, but not rays
 LIGHTS_ALONE = Feature("lights alone", _all_of(cutouts.SHADOW_PANES, MIS), "mis_lights.cl", helper=True)
+#: surfaces that let light samples through farther than rays
+PANES = Feature("panes", _all_of(cutouts.OPACITY_SEEN, MIS, sampled.INDIRECT), "mis_panes.cl", helper=True)
 GLOSS_LIGHT = Feature("gloss light", _all_of(rough.GLOSS_MIRROR, SCATTER), "gloss_light.cl", helper=True)
 METAL_LIGHT = Feature("metal light", _all_of(rough.METAL_ROUGH, SCATTER), "metal_rough_light.cl", helper=True)
 METAL_MIS = Feature("metal mis", _all_of(METAL_LIGHT, rough.METAL_RAY), "metal_rough_mis.cl", helper=True)
 METAL_INDIRECT = Feature(
     "metal indirect", _all_of(rough.METAL_ROUGH, sampled.INDIRECT), "metal_rough_indirect.cl", branches=1, helper=True
 )
-AREA_MIS = Feature("area light mis", _all_of(sampled.AREA_LIGHT, MIS), "arealight_mis.cl", helper=True)
+AREA_MIS = Feature("area light mis", _all_of(sampled.AREA_LIGHT, MIS), "arealight_mis.cl", material=(("emission_drawn", np.int32),), helper=True)
 AREA_SPHERE = Feature("round area light", _all_of(AREA_MIS, shapes.SPHERES), "arealight_sphere.cl", helper=True)
 ENVIRONMENT_MIS = Feature("environment mis", _all_of(surroundings.ENVIRONMENT_LIGHT, MIS), "environment_mis.cl", helper=True)

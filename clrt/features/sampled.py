@@ -18,8 +18,8 @@ def area_caller(scene: Scene) -> int | None:
 
 
 def indirect_caller(scene: Scene) -> int | None:
-    """The line `indirect`, where rays may go on at all."""
-    return scene.indirect.line if scene.indirect is not None and scene.depth > 0 else None
+    """The line `indirect`; also without depth, where nothing scatters: it takes the place of the ambient part."""
+    return scene.indirect.line if scene.indirect is not None else None
 
 
 def _clamp_caller(scene: Scene) -> int | None:

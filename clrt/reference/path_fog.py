@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from clrt.reference import media
 from clrt.reference.path_lights import Incoming, arriving, from_areas, from_points
 from clrt.reference.path_world import Generator, PathWorld, Wave
 
@@ -32,6 +33,7 @@ def fogged(world: PathWorld, wave: Wave, t: FloatArray, rng: Generator) -> tuple
     for light in lights:
         scatters = phase(fog.asymmetry, np.einsum("mi,mi->m", light.direction, part.direction))
         airlight[rows] += scatters[:, None] * arriving(world, light, point, nowhere, part.time)
+    airlight[rows] *= media.transmittance(world.absorption[part.stack.top], s[rows])
     return airlight * np.array(fog.albedo), np.exp(-fog.density * t)
 
 

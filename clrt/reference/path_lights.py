@@ -85,7 +85,7 @@ def from_areas(world: PathWorld, point: FloatArray, own: IndexArray, time: Float
     outside = sphere & (own != target) & _outside(world, target, point)
     faces = np.where(sphere, ~outside | (cosine > 0.0), target != own) & (distance > 0.0)
     weight = np.divide(np.abs(cosine) * area.sum(), distance**2, where=faces, out=np.zeros(m))
-    return Incoming(direction, distance, weight[:, None] * world.emission[target], target)
+    return Incoming(direction, distance, weight[:, None] * world.sent[target], target)
 
 
 def points_on(world: PathWorld, prim: IndexArray, rng: Generator) -> tuple[FloatArray, FloatArray]:

@@ -32,7 +32,7 @@ class PathWorld:
     motion : (n + k, 3) of each primitive, scene units a unit of time
     duals : (n, 2, 3) g1, g2 in the plane of each triangle, so that (p - v0) . g1 and (p - v0) . g2 are the barycentric weights of
         corners 1 and 2 of a point p of it; zero where the area is zero
-    emission : (n + k, 3) radiance of each primitive; area : (n + k,) its area
+    emission : (n + k, 3) radiance of each primitive; sent : (n + k, 3) that times its opacity; area : (n + k,) its area
     metal_rough, metallic, gloss, alpha : (materials,) alpha is that of the facets of metal-rough materials and of those with gloss
     rank, absorption : of objects, see media.ranks and media.absorption
     first : the media around the eye, as of one ray; cover : what primitives in the way of light keep of it
@@ -44,6 +44,7 @@ class PathWorld:
     motion: FloatArray
     duals: FloatArray
     emission: FloatArray
+    sent: FloatArray
     area: FloatArray
     metal_rough: BoolArray
     metallic: FloatArray
@@ -64,6 +65,7 @@ class PathWorld:
         still = np.zeros((len(scene.spheres), 3))
         motion = np.concatenate([*(np.broadcast_to(np.array(o.motion), (len(o), 3)) for o in objects), still])
         emission = np.array([m.emission for m in scene.materials], np.float64).reshape(-1, 3)[prims.material]
+        part = np.array([m.opacity if m.opacity_seen else 1.0 for m in scene.materials])[prims.material]
         edges = prims.vertices[:, 1:] - prims.vertices[:, :1]
         area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1) / 2.0
         duals = np.where((area > 0.0)[:, None, None], np.swapaxes(np.linalg.pinv(edges), 1, 2), 0.0)
@@ -74,7 +76,7 @@ class PathWorld:
         metallic, gloss, roughness = (np.array([getattr(m, name) for m in scene.materials], np.float64)
                                       for name in ("metallic", "gloss", "roughness"))  # fmt: skip
         alpha = np.maximum(np.where(metal_rough, roughness, gloss) ** 2, LEAST_ALPHA)
-        return cls(scene, prims, materials, motion, duals, emission, np.concatenate([area, 4.0 * np.pi * prims.radii**2]),
+        return cls(scene, prims, materials, motion, duals, emission, emission * part[:, None], np.concatenate([area, 4.0 * np.pi * prims.radii**2]),
                    metal_rough, metallic, gloss, alpha, rank, absorption, _around_eye(scene, prims, materials, rank),
                    SceneCover.of(scene))  # fmt: skip
 
@@ -100,6 +102,8 @@ def _check(scene: Scene) -> None:
     if scene.indirect is not None and np.isfinite(scene.indirect.clamp):
         raise SceneError("a clamp makes pictures that depend on how they are sampled; the reference takes scenes without one")
     for k, material in enumerate(scene.materials):
+        if max(material.emission) > 0.0 and material.alpha_texture >= 0:
+            raise SceneError(f"material {k} shines through a picture's alpha, which the reference of sampled light does not know; leave it out")
         if material.emission_map >= 0 or material.metal_rough_map >= 0:
             raise SceneError(f"material {k} has a map that the reference of sampled light does not read; leave it out")
 

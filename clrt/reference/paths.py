@@ -86,7 +86,7 @@ def _step(world: PathWorld, wave: Wave, total: FloatArray, goes_on: bool, rng: G
     tint = wave.tint * media.transmittance(world.absorption[wave.stack.top], t)
     if world.scene.fog is not None and world.scene.fog.density > 0.0:
         airlight, left = fogged(world, wave, t, rng)
-        _add(total, wave, tint * airlight)
+        _add(total, wave, wave.tint * airlight)
         tint = tint * left[:, None]
     wave = wave.tinted(tint)
     missed, hit = np.flatnonzero(prim < 0), np.flatnonzero(prim >= 0)

@@ -18,12 +18,13 @@ class Emitters:
     """k emitters, triangles first.
 
     vertices : (k, 3, 3) float64, of a sphere its centre three times; radius : (k,) 0 for triangles
-    radiance : (k, 3); area : (k,); triangles of zero area are left out
+    radiance : (k, 3); part : (k,) of it that is sent out, the surface's opacity; area : (k,); triangles of zero area are left out
     """
 
     vertices: FloatArray
     radius: FloatArray
     radiance: FloatArray
+    part: FloatArray
     area: FloatArray
 
     @property
@@ -38,8 +39,8 @@ class Emitters:
 
 
 def _shining(scene: Scene) -> NDArray[np.bool_]:
-    """(materials,): light that a picture (emission_map) shapes is found by rays that meet it alone."""
-    return np.array([max(m.emission) > 0.0 and m.emission_map < 0 for m in scene.materials], np.bool_)
+    """(materials,): light that a picture shapes is found by rays that meet it alone."""
+    return np.array([m.emission_drawn for m in scene.materials], np.bool_)
 
 
 def _standing(scene: Scene) -> Iterator[tuple[MeshObject, FloatArray]]:
@@ -62,10 +63,13 @@ def emitters_of(scene: Scene) -> Emitters:
     vertices, material, area = vertices[flat], material[flat], area[flat]
     balls = np.flatnonzero(shining[scene.spheres.material_ids])
     radius = scene.spheres.radii[balls]
+    of = np.concatenate([material, scene.spheres.material_ids[balls].astype(np.int64)])
+    part = np.array([m.opacity if m.opacity_seen else 1.0 for m in scene.materials])
     return Emitters(
         np.concatenate([vertices, np.repeat(scene.spheres.centers[balls][:, None], 3, axis=1)]),
         np.concatenate([np.zeros(len(vertices)), radius]),
-        radiance[np.concatenate([material, scene.spheres.material_ids[balls].astype(np.int64)])],
+        radiance[of],
+        part[of],
         np.concatenate([area, 4.0 * np.pi * radius**2]),
     )
 

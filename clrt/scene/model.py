@@ -129,6 +129,11 @@ class Material:
         return self.texture if self.alpha else -1
 
     @property
+    def emission_drawn(self) -> bool:
+        """Whether light samples know of its light: not where a picture shapes it, whose rays alone find it."""
+        return max(self.emission) > 0.0 and self.emission_map < 0 and self.alpha_texture < 0
+
+    @property
     def translucent(self) -> bool:
         """Whether some of the light may pass straight through."""
         return self.opacity < 1.0 or self.alpha_texture >= 0
