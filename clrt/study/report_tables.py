@@ -172,6 +172,11 @@ def _facts(content: Mapping[str, Any]) -> Iterator[str]:
         yield _sentence(note)
     if (floor := Number.of(content.get("floor"))) is not None:
         yield f"Noise floor, the error of the reference itself: {floor}."
+    if isinstance(reference := content.get("reference"), Mapping):
+        times = reference.get("times_largest")
+        yield f"The reference: {reference.get('rung')}, {reference.get('samples'):,} samples a pixel, {times} times those of the largest point."
+    if isinstance(against := content.get("against"), str):
+        yield f"Error: {against}."
     if isinstance(verdict := content.get("verdict"), str):
         yield _sentence(f"verdict: {verdict}")
 
