@@ -94,7 +94,7 @@ def test_predictions_are_within_a_fifth_on_four_of_five_scenes(device: Device) -
 
 def test_adaptive_sampling_of_a_soft_shadow_takes_at_most_six_tenths_of_uniform_samplings_time(device: Device) -> None:
     """Uniform samples of one sequence, as `--samples N`, for the two powers of two around the same error; between both on log axes."""
-    renders = Renders(soft_shadow().with_size(384, 256), device)
+    renders = Renders(soft_shadow().with_size(192, 128), device)
     truth, _ = renders.truth(1024)
 
     def error_of(pixels: FloatArray) -> float:
