@@ -158,7 +158,7 @@ def test_markdown_tables_are_whole_and_say_the_numbers(written: Path) -> None:
         assert len({len(line) for line in lines}) == 1
         assert len({line.count(" | ") for line in lines}) == 1
     assert [name for name in PLOTS if f"(plots/{name}.svg)" not in text] == []
-    assert "The reference: double, 6,400 samples a pixel, 100 times those of the largest point." in text
+    assert "The reference: double, 6400 samples a pixel, 100 times those of the largest point." in text
     assert "Error: root mean square error against depth 8." in text
     assert "- brute: 69,451 triangles: it would take about 40 minutes" in text
 

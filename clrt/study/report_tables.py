@@ -173,8 +173,8 @@ def _facts(content: Mapping[str, Any]) -> Iterator[str]:
     if (floor := Number.of(content.get("floor"))) is not None:
         yield f"Noise floor, the error of the reference itself: {floor}."
     if isinstance(reference := content.get("reference"), Mapping):
-        times = reference.get("times_largest")
-        yield f"The reference: {reference.get('rung')}, {reference.get('samples'):,} samples a pixel, {times} times those of the largest point."
+        rung, samples, times = (_text(reference.get(key)) for key in ("rung", "samples", "times_largest"))
+        yield f"The reference: {rung}, {samples} samples a pixel, {times} times those of the largest point."
     if isinstance(against := content.get("against"), str):
         yield f"Error: {against}."
     if isinstance(verdict := content.get("verdict"), str):
