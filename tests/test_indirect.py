@@ -147,7 +147,10 @@ def test_ambient_part_is_left_out_at_any_depth() -> None:
 
 
 PANES = "".join(f"T -9 -9 {z}  9 -9 {z}  0 18 {z}\n" for z in (-1.0, -0.8, -0.6))
-BEHIND_PANES = "E 0 0 -4\nV 0 0 1\nF 10\nR 6 4\nindirect\n{}M 0.5 0.5 0.5  0 1 0 1 0\nT -9 -9 0  9 -9 0  0 18 0\nM 1 1 1  0 1 0 1 0\nopacity {}\n" + PANES
+BEHIND_PANES = (
+    "E 0 0 -4\nV 0 0 1\nF 10\nR 6 4\nindirect\n{}M 0.5 0.5 0.5  0 1 0 1 0\nT -9 -9 0  9 -9 0  0 18 0\nM 1 1 1  0 1 0 1 0\nopacity {}\n"
+    + PANES
+)
 LAMP = "M 0 0 0  0 0 0 1 0\narealight 2 2 2\nS 0 0 -9 3\n"
 
 
@@ -161,15 +164,17 @@ def test_surfaces_behind_panes_lose_no_light_when_the_depth_ends(opacity: float,
 
 
 def test_lamp_that_is_not_opaque_lights_as_it_is_seen() -> None:
-    scene = parse_scene("E 0 0 -4\nV 0 0 1\nF 10\nR 4 3\ndepth 2\nindirect\nM 1 1 1 0 0.5 0 1 0\nopacity 0.3\narealight 1 1 1\nS 0 0 0 1\n")
+    text = "E 0 0 -4\nV 0 0 1\nF 10\nR 4 3\ndepth 2\nindirect\nM 1 1 1 0 0.5 0 1 0\nopacity 0.3\narealight 1 1 1\nS 0 0 0 1\n"
+    scene = parse_scene(text)
     reference = render_paths(scene, 600, 3)
     assert_same(device_batches(scene, 64, range(8)), reference.mean, reference.variance_of_mean)
 
 
 def test_random_numbers_are_those_of_the_ray_whatever_its_packet() -> None:
     """Packets of 16 and of 8 lanes: the same numbers, so the same picture but for rounding; also where only some lanes meet a pane."""
-    text = "E 0 1 -4\nV 0 -0.2 1\nF 40\nR 24 16\nindirect\ndepth 2\nL 2 4 -3\nM 0.8 0.8 0.8  0 0.9 0 1 0\nT -9 0 -9  9 0 -9  0 0 9\n"
-    scene = parse_scene(text + "M 0.2 0.9 0.3  0 0.9 0 1 0\nopacity 0.5\nT -1 0 -1  1 0 -1  0 1.5 -1\nM 0.9 0.5 0.2  0 0.9 0 1 0.2\nS 0.8 0.5 0.5 0.5\n")
+    floor = "E 0 1 -4\nV 0 -0.2 1\nF 40\nR 24 16\nindirect\ndepth 2\nL 2 4 -3\nM 0.8 0.8 0.8  0 0.9 0 1 0\nT -9 0 -9  9 0 -9  0 0 9\n"
+    pane = "M 0.2 0.9 0.3  0 0.9 0 1 0\nopacity 0.5\nT -1 0 -1  1 0 -1  0 1.5 -1\n"
+    scene = parse_scene(floor + pane + "M 0.9 0.5 0.2  0 0.9 0 1 0.2\nS 0.8 0.5 0.5 0.5\n")
     single, double = (clrt.render(scene, samples=4, precision=rung).pixels for rung in ("watertight", "double"))
     apart = np.abs(single - double).max(axis=2) > 1e-3
     assert apart.mean() < 0.01

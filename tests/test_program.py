@@ -87,7 +87,8 @@ def test_stack_size_covers_the_depth() -> None:
 def test_private_memory_beyond_a_thread_is_refused() -> None:
     with pytest.raises(LimitError, match="--depth"):
         program.check_limits(rung("watertight"), 16, Shape(stack=64, depth=2000), ALL)
-    program.check_limits(rung("watertight"), 16, Shape(stack=64, depth=64), ALL)
+    mirrors = Features.named(("spheres", "shadows", "direct light", "mirror", "refraction"))
+    program.check_limits(rung("watertight"), 16, Shape(stack=64, depth=64), mirrors)
 
 
 @pytest.mark.parametrize("option", ["-cl-fast-relaxed-math", "-cl-unsafe-math-optimizations", "-cl-finite-math-only", "-cl-mad-enable"])

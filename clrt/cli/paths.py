@@ -24,7 +24,9 @@ def check_scene(path: Path) -> None:
             raise ClrtError(f"no command and no file is called {path}; did you mean `clrt {near[0]}`?")
     check_input(path)
     if path.suffix.lower() in _MESHES:
-        raise ClrtError(f"{path}: this is a mesh; `clrt convert {path} scene.txt` makes a scene of it, the line \"mesh {path.name}\" puts it into one")
+        raise ClrtError(
+            f"{path}: this is a mesh; `clrt convert {path} scene.txt` makes a scene of it, the line \"mesh {path.name}\" puts it into one"
+        )
 
 
 def check_input(path: Path) -> None:

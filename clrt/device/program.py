@@ -111,7 +111,8 @@ def _structs(features: Features, precision: Precision, entry: str) -> str:
 
 
 def material_dtype(features: Features, precision: Precision) -> np.dtype[np.void]:
-    return layout.material(precision.real, [(n, precision.real if t is REAL else t, *shape) for f in features.active for n, t, *shape in f.material])
+    members = [(n, precision.real if t is REAL else t, *shape) for f in features.active for n, t, *shape in f.material]
+    return layout.material(precision.real, members)
 
 
 def light_dtype(features: Features, real: type) -> np.dtype[np.void]:

@@ -76,6 +76,8 @@ METAL_MIS = Feature("metal mis", _all_of(METAL_LIGHT, rough.METAL_RAY), "metal_r
 METAL_INDIRECT = Feature(
     "metal indirect", _all_of(rough.METAL_ROUGH, sampled.INDIRECT), "metal_rough_indirect.cl", branches=1, helper=True
 )
-AREA_MIS = Feature("area light mis", _all_of(sampled.AREA_LIGHT, MIS), "arealight_mis.cl", material=(("emission_drawn", np.int32),), helper=True)
+AREA_MIS = Feature(
+    "area light mis", _all_of(sampled.AREA_LIGHT, MIS), "arealight_mis.cl", material=(("emission_drawn", np.int32),), helper=True
+)
 AREA_SPHERE = Feature("round area light", _all_of(AREA_MIS, shapes.SPHERES), "arealight_sphere.cl", helper=True)
 ENVIRONMENT_MIS = Feature("environment mis", _all_of(surroundings.ENVIRONMENT_LIGHT, MIS), "environment_mis.cl", helper=True)

@@ -76,7 +76,8 @@ class PathWorld:
         metallic, gloss, roughness = (np.array([getattr(m, name) for m in scene.materials], np.float64)
                                       for name in ("metallic", "gloss", "roughness"))  # fmt: skip
         alpha = np.maximum(np.where(metal_rough, roughness, gloss) ** 2, LEAST_ALPHA)
-        return cls(scene, prims, materials, motion, duals, emission, emission * part[:, None], np.concatenate([area, 4.0 * np.pi * prims.radii**2]),
+        return cls(scene, prims, materials, motion, duals, emission, emission * part[:, None],
+                   np.concatenate([area, 4.0 * np.pi * prims.radii**2]),
                    metal_rough, metallic, gloss, alpha, rank, absorption, _around_eye(scene, prims, materials, rank),
                    SceneCover.of(scene))  # fmt: skip
 
@@ -103,7 +104,7 @@ def _check(scene: Scene) -> None:
         raise SceneError("a clamp makes pictures that depend on how they are sampled; the reference takes scenes without one")
     for k, material in enumerate(scene.materials):
         if max(material.emission) > 0.0 and material.alpha_texture >= 0:
-            raise SceneError(f"material {k} shines through a picture's alpha, which the reference of sampled light does not know; leave it out")
+            raise SceneError(f"material {k} shines through a picture's alpha, which this reference does not know; leave it out")
         if material.emission_map >= 0 or material.metal_rough_map >= 0:
             raise SceneError(f"material {k} has a map that the reference of sampled light does not read; leave it out")
 
