@@ -19,6 +19,7 @@ from click.testing import CliRunner, Result
 from clrt.cli.main import cli
 from clrt.errors import ClrtError
 from clrt.scene.build import load_scene
+from clrt.scene.model import Indirect, Scene
 from clrt.study import measure_samples, run, store, verdict
 from clrt.study.compare import compare
 from clrt.study.plan import QUICK, Plan
@@ -327,13 +328,17 @@ def test_comparison_on_screen_and_as_json(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scene", "start"), [("clamp", "biased: indirect clamp"), ("indirect", "unbiased")])
-def test_clamped_light_is_named_biased(scene: str, start: str, tmp_path: Path, device: Any) -> None:
+@pytest.mark.parametrize(("clamp", "start"), [(0.1, "biased: indirect clamp"), (0.5, "unbiased")])
+def test_clamped_light_is_named_biased_where_it_is_cut(clamp: float, start: str, tmp_path: Path, device: Any) -> None:
+    """scenes/clamp.txt: each further hit brings 0.3, so that a bound of 0.5 cuts nothing, and one of 0.1 does."""
+    path = SCENES / "clamp.txt"
+
+    def read() -> Scene:
+        return replace(load_scene(path), indirect=Indirect(clamp, 1))
+
     plan: Plan = replace(TINY, most_samples=32, reference_factor=32, reference_s=60.0, batches=16)
-    path = SCENES / f"{scene}.txt"
-    subject = open_subject(path, partial(load_scene, path), device, plan, tmp_path, (16, 12), lambda phase, fraction: None)
-    found = measure_samples.measure(subject, {})
-    assert found["bias"]["verdict"].startswith(start)
+    subject = open_subject(path, read, device, plan, tmp_path, (16, 12), lambda phase, fraction: None)
+    assert measure_samples.measure(subject, {})["bias"]["verdict"].startswith(start)
 
 
 @pytest.mark.slow

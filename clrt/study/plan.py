@@ -48,9 +48,9 @@ class Plan:
 
 
 FULL = Plan(
-    quick=False, side=320, seeds=12, flip_seeds=8, most_samples=64, least_samples=8, reference_factor=100, reference_s=90.0, batches=16,
+    quick=False, side=256, seeds=12, flip_seeds=8, most_samples=64, least_samples=8, reference_factor=100, reference_s=90.0, batches=16,
     rounds=21, part_s=12.0, oracle_rays=2000, leak_rays=300_000, compile_rounds=6, compiled=None, count_brute=True,
-    brute_pairs=10_000_000_000, depths=8, samples=16,
+    brute_pairs=10_000_000_000, depths=8, samples=8,
 )  # fmt: skip
 QUICK = Plan(
     quick=True, side=160, seeds=10, flip_seeds=3, most_samples=16, least_samples=8, reference_factor=16, reference_s=5.0, batches=16,

@@ -58,12 +58,12 @@ def _digits(results: list[Result]) -> str:
         if slope is None or cost is None:
             lines.append(f"- {name}: no slope could be measured; {samples.get('slope_note', 'the error does not surely fall')}.")
             continue
-        seconds = last["seconds"]["median"] * cost[0]
         kind = "steeper than" if slope["high"] < _RANDOM else "slower than" if slope["low"] > _RANDOM else "not measurably other than"
+        error, time = last["rmse"]["median"], last["seconds"]["median"]
         lines.append(
             f"- {name}: the error falls with the samples to the power {text_of(slope)}, {kind} random sampling. "
-            f"The next digit takes {cost[0]:.3g}x the samples ({cost[1]:.3g} to {cost[2]:.3g}): from {last['rmse']['median']:.2g} in {last['seconds']['median']:.2g} s to "
-            f"{last['rmse']['median'] / 10:.2g} in about {seconds:.2g} s. The mean is {result['study']['bias']['verdict']}."
+            f"The next digit takes {cost[0]:.3g}x the samples ({cost[1]:.3g} to {cost[2]:.3g}): from {error:.2g} in {time:.2g} s to "
+            f"{error / 10:.2g} in about {cost[0] * time:.2g} s. The mean is {result['study']['bias']['verdict']}."
         )
     return "\n".join(lines)
 
