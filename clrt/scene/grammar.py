@@ -14,7 +14,10 @@ MOST_PIXELS = 2**28
 
 @dataclass(frozen=True)
 class Field:
-    """One number: its name and the interval that it must lie in; an open end excludes the bound itself."""
+    """One number: its name and the interval that it must lie in; an open end excludes the bound itself.
+
+    within : the interval in words, where the other fields of the line narrow it
+    """
 
     name: str
     low: float = -LARGEST
@@ -22,6 +25,7 @@ class Field:
     low_open: bool = False
     high_open: bool = False
     whole: bool = False
+    within: str = ""
 
     def rejects(self, values: NDArray[np.float64]) -> NDArray[np.bool_]:
         """True where a value, (n,) float64 and not NaN, is outside the interval, or not whole where it must be."""
@@ -36,6 +40,8 @@ class Field:
 
     def accepted(self) -> str:
         """The interval in words, to follow "must be"."""
+        if self.within:
+            return self.within
         kind = "a whole number " if self.whole else ""
         if self.low == -LARGEST:
             return f"{kind}between {self.low:g} and {self.high:g}"

@@ -46,6 +46,22 @@ class Folders:
         return path
 
 
+@dataclass(frozen=True)
+class Use:
+    """What a picture is for, as messages tell it.
+
+    what : what it is called; most : texels that it may have
+    formats : to save it in, where it is in none that is read
+    fewer_bits, plain : how else to save it, where it has too many bits, or pixels of an odd kind
+    """
+
+    what: str = "a picture"
+    most: int = MOST_TEXELS
+    formats: str = "PNG or JPEG"
+    fewer_bits: str = "with 8, or in greyscale with 16"
+    plain: str = "as PNG with 8 bits a channel"
+
+
 def _nearby(path: Path) -> str:
     if not path.parent.is_dir():
         return ""
@@ -53,7 +69,7 @@ def _nearby(path: Path) -> str:
     return f'; did you mean "{near[0]}"?' if near else ""
 
 
-def read_picture(path: Path | IO[bytes], name: str) -> Picture:
+def read_picture(path: Path | IO[bytes], name: str, use: Use = Use()) -> Picture:
     """The picture of a file, or of its bytes. Raises PictureError for no picture, one cut off, without a size, of more than one frame."""
     from PIL import Image, UnidentifiedImageError
 
@@ -61,33 +77,33 @@ def read_picture(path: Path | IO[bytes], name: str) -> Picture:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with Image.open(path, formats=FORMATS) as image:
-                _check(image, name)
+                _check(image, name, use)
                 image.load()
                 texels = _texels(image)
     except UnidentifiedImageError:
-        raise PictureError(f"{name} is no picture that can be read, or has no pixels; save it as PNG or JPEG") from None
+        raise PictureError(f"{name} is no picture that can be read, or has no pixels; save it as {use.formats}") from None
     except Image.DecompressionBombError:
-        raise PictureError(f"{name} is too large; a picture has at most {MOST_TEXELS} pixels") from None
+        raise PictureError(f"{name} is too large; {use.what} has at most {use.most} pixels") from None
     except (OSError, SyntaxError, ValueError, TypeError, EOFError, IndexError, struct.error, zlib.error) as problem:
         raise PictureError(f"{name} is damaged or cut off ({problem}); save it again") from None
     return Picture(texels, name)
 
 
-def _check(image: Any, name: str) -> None:
+def _check(image: Any, name: str, use: Use) -> None:
     """Refuses, before the texels are read, what would not be read without loss or fit in memory."""
     width, height = image.size
     frames = getattr(image, "n_frames", 1)
     if width < 1 or height < 1:
-        raise PictureError(f"{name} has {width} x {height} pixels; a picture has at least one")
-    if width * height > MOST_TEXELS:
-        raise PictureError(f"{name} has {width} x {height} pixels; a picture has at most {MOST_TEXELS}")
+        raise PictureError(f"{name} has {width} x {height} pixels; {use.what} has at least one")
+    if width * height > use.most:
+        raise PictureError(f"{name} has {width} x {height} pixels; {use.what} has at most {use.most}")
     if frames > 1:
         raise PictureError(f"{name} is animated: it has {frames} frames; save the one that is meant as a picture of its own")
     deep = any("16" in str(part) for tile in image.tile for part in np.atleast_1d(np.array(tile[3], object)))
     if deep and image.mode not in (*_GREY_16, "I"):
-        raise PictureError(f"{name} has colours of 16 bits a channel; save it with 8, or in greyscale with 16")
+        raise PictureError(f"{name} has colours of 16 bits a channel; save it {use.fewer_bits}")
     if image.mode not in (*_BYTE_MODES, *_GREY_16) and not (image.mode == "I" and deep):
-        raise PictureError(f"{name} has pixels of the kind {image.mode}; save it as PNG with 8 bits a channel")
+        raise PictureError(f"{name} has pixels of the kind {image.mode}; save it {use.plain}")
 
 
 def _texels(image: Any) -> NDArray[np.uint8] | NDArray[np.uint16]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from clrt.scene.grammar import LARGEST, LARGEST_SIDE
 from clrt.scene.model import FloatArray
-from clrt.scene.picture import PictureError, read_picture
+from clrt.scene.picture import PictureError, Use, read_picture
 
 MOST_TEXELS = 1 << 25  #: of one picture: 8192 x 4096, 768 MiB in float64
 #: how a file begins -> what it is
@@ -41,7 +41,8 @@ def _check_size(width: int, height: int, name: str) -> None:
 
 def _decoded(path: Path, name: str) -> FloatArray:
     """A picture of codes as linear numbers, by IEC 61966-2-1 (1999)."""
-    texels = read_picture(path, name).texels[..., :3]
+    deep = "as .hdr or .exr"
+    texels = read_picture(path, name, Use("an environment", MOST_TEXELS, ".hdr, .exr or PNG", deep, deep)).texels[..., :3]
     _check_size(texels.shape[1], texels.shape[0], name)
     code = texels / float(np.iinfo(texels.dtype).max)
     return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)

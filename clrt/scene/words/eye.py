@@ -12,6 +12,7 @@ LATEST = 1e6  #: of times, and their opposite the earliest
 
 _RADIUS, _FOCUS = "radius of the lens", "distance of the sharp plane"
 _OPEN, _CLOSE = "time at which the shutter opens", "time at which it closes"
+_RADII = f"at least 0 and at most {WIDEST_LENS:g} times the {_FOCUS}"
 MOTION = "the motion"  #: the fields of `move` are "x of the motion" and so on
 
 
@@ -37,7 +38,9 @@ def _set_shutter(draft: Draft, call: WordCall) -> None:
 
 
 WORDS: dict[str, Word] = {
-    "lens": Word((Field(_RADIUS, low=0.0), Field(_FOCUS, low=0.0, low_open=True)), "lens 0.05 4", _set_lens, check=_check_lens),
+    "lens": Word(
+        (Field(_RADIUS, low=0.0, within=_RADII), Field(_FOCUS, low=0.0, low_open=True)), "lens 0.05 4", _set_lens, check=_check_lens
+    ),
     "move": Word(point_fields(MOTION), "move 0.5 0 0", no_change, ((Choice("of", ("object", "eye")), "object"),), once=False),
     "shutter": Word((Field(_OPEN, -LATEST, LATEST), Field(_CLOSE, -LATEST, LATEST)), "shutter 0 1", _set_shutter, check=_check_shutter),
 }
