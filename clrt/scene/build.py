@@ -72,6 +72,8 @@ def parse_scene(
     found = read_declarations(text, source, faults)
     if origins:
         found.words = [origins.relocated(call, folders) for call in found.words]
+    if _lacks_lines(found, faults):
+        faults.raise_if_any()
     _check_primitives(found, faults)
     _check_materials(found, faults)
     _check_words(found, faults)
@@ -122,11 +124,16 @@ def _light_warnings(draft: Draft, environment: Environment | None) -> list[str]:
     return warnings
 
 
+def _lacks_lines(found: Declarations, faults: Faults) -> bool:
+    """Whether another text could not be included: whatever else is missing may stand there."""
+    return "include" in found.broken or any(call.name == "include" and faults.on_line(call.line) for call in found.words)
+
+
 def _check_primitives(found: Declarations, faults: Faults) -> None:
     """There is something to render, and a material above the first of it."""
     first = {letter: int(lines[0]) for letter in "TSM" if len(lines := found.lines_of(letter))}
     if "T" not in first and "S" not in first:
-        if any(line.lstrip().startswith("mesh ") for line in found.text_lines):
+        if "mesh" in found.broken or any(call.name == "mesh" for call in found.words):
             return
         faults.add(1, 1, 'there is nothing to render; add a triangle, such as "T 0 0 1 1 0 1 0 1 1", or a sphere, such as "S 0 0 2 1"')
         return

@@ -23,10 +23,14 @@ def shown(token: str) -> str:
 
 def did_you_mean(token: str, valid: Iterable[str]) -> str:
     """`; did you mean "depth"?` for the nearest valid word, or nothing where none is near."""
-    if len(token) > LONGEST_SHOWN:
-        return ""
-    near = difflib.get_close_matches(token.lower(), list(valid), n=1)
-    return f'; did you mean "{near[0]}"?' if near else ""
+    near = nearest(token, valid)
+    return f'; did you mean "{near}"?' if near else ""
+
+
+def nearest(token: str, valid: Iterable[str]) -> str:
+    """The valid word that was probably meant; nothing where none is near."""
+    near = difflib.get_close_matches(token.lower(), list(valid), n=1) if len(token) <= LONGEST_SHOWN else []
+    return near[0] if near else ""
 
 
 class Faults:
@@ -37,6 +41,7 @@ class Faults:
         self.origins: Origins | None = None
         self._found: list[tuple[int, int, str]] = []
         self._lines: set[int] = set()
+        self._listed: set[str] = set()
 
     def add(self, line: int, column: int, message: str) -> None:
         self._found.append((line, column, message))
@@ -45,6 +50,12 @@ class Faults:
     def on_line(self, line: int) -> bool:
         """Whether a fault of this line has been noted."""
         return line in self._lines
+
+    def once(self, listing: str) -> str:
+        """A list for a message: whole the first time, nothing after that."""
+        told = listing in self._listed
+        self._listed.add(listing)
+        return "" if told else listing
 
     def raise_if_any(self) -> None:
         """Raise a SceneError that holds the first 20 errors in the order of the text, and how many more there are."""

@@ -55,10 +55,14 @@ def name_objects(objects: tuple[MeshObject, ...], found: Declarations, faults: F
 
 @dataclass(frozen=True, eq=False)
 class _Places:
-    """What instances may be of: names of objects with their numbers, and `instance` lines with a name."""
+    """What instances may be of: names of objects with their numbers, and `instance` lines with a name.
+
+    refused : names of objects whose own line is at fault
+    """
 
     objects: dict[str, int]
     calls: dict[str, WordCall]
+    refused: frozenset[str]
 
 
 def build_instances(
@@ -78,7 +82,7 @@ def build_instances(
     shown_ones = tuple(i for i, call in made if call.text("hidden") == "no")
     hidden = [c for c in found.words if c.name in ("object", "instance", "mesh") and c.text("hidden") == "yes"]
     anything = shown_ones or not all(o.hidden for o in named) or len(found.lines_of("S"))
-    if hidden and not anything and not any(faults.on_line(c.line) for c in calls):
+    if hidden and not anything and not any(faults.on_line(c.line) for c in (*calls, *hidden)):
         faults.add(hidden[0].line, hidden[0].column, "everything is hidden; place an instance of it, or leave out hidden=yes")
     return named, shown_ones
 
@@ -86,6 +90,7 @@ def build_instances(
 def _places(meshes: Mapping[int, int], found: Declarations, calls: list[WordCall], faults: Faults) -> _Places:
     lines: dict[str, int] = {}
     objects: dict[str, int] = {}
+    refused: set[str] = set()
     for call in (c for c in found.words if c.name == "object" or (c.name in ("instance", "mesh") and c.text("name"))):
         name = call.text("name")
         if name in lines:
@@ -96,7 +101,10 @@ def _places(meshes: Mapping[int, int], found: Declarations, calls: list[WordCall
         at = object_at(found, call.line) if call.name == "object" else meshes.get(call.line)
         if at is not None:
             objects[name] = at
-    return _Places(objects, {c.text("name"): c for c in calls if c.text("name") and lines[c.text("name")] == c.line})
+        elif call.name != "instance":
+            refused.add(name)
+    chained = {c.text("name"): c for c in calls if c.text("name") and lines[c.text("name")] == c.line}
+    return _Places(objects, chained, frozenset(refused))
 
 
 def _instance(
@@ -107,7 +115,7 @@ def _instance(
     while (of := at.text("of")) not in places.objects:
         inner = places.calls.get(of)
         if inner is None:
-            if at is call:
+            if at is call and of not in places.refused:
                 faults.add(call.line, call.columns["of"], f"no object is called {shown(of)}{_names_there_are(of, places)}")
             return None
         if inner.line in seen:

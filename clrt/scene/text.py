@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from clrt.errors import SceneError
 from clrt.scene.bulk import Rows, read_bulk
-from clrt.scene.faults import Faults, did_you_mean, shown
+from clrt.scene.faults import Faults, nearest, shown
 from clrt.scene.grammar import LETTERS, counts_taken
 from clrt.scene.model import FloatArray
 from clrt.scene.tokens import Token, read_number, report_range, tokenise
@@ -30,7 +30,7 @@ class Declarations:
 
     text_lines : the lines as written, for the columns of faults found later
     rows : (letter, count of fields) -> the lines of that form; forms that do not occur are absent
-    broken : letter -> numbers of the lines that start with it and could not be read
+    broken : letter or word -> numbers of the lines that start with it, or nearly so, and could not be read
     words : the lines that start with a word, in their order
     """
 
@@ -154,6 +154,8 @@ class _ExactReader:
             call = read_word(tokens, line, self._faults)
             if call is not None:
                 self._found.words.append(call)
+            else:
+                self._note_broken(name if name in WORDS else nearest(name, WORDS), line)
         else:
             self._report_name(tokens[0], line)
 
@@ -170,17 +172,20 @@ class _ExactReader:
         if len(numbers) == fields:
             place = tokens[1] if fields else tokens[0]
             self._faults.add(line, place.column, f"{letter} takes {counts_taken(letter)}, found {fields}")
-        self._found.broken.setdefault(letter, []).append(line)
+        self._note_broken(letter, line)
+
+    def _note_broken(self, meant: str, line: int) -> None:
+        """Take the line as one of what was meant, if that is known, or its absence would be reported on top."""
+        if meant:
+            self._found.broken.setdefault(meant, []).append(line)
 
     def _report_name(self, token: Token, line: int) -> None:
         name, letters = token.text, ", ".join(sorted(LETTERS))
         meant = name.upper() if name.upper() in LETTERS else name[0] if name[0] in LETTERS and name[1:2].isdigit() else ""
-        if meant:
-            # Taken as the letter that was meant, or its absence would be reported on top.
-            self._found.broken.setdefault(meant, []).append(line)
-            hint = f'; did you mean "{meant}"?' if name.upper() == meant else f'; is a blank missing after "{meant}"?'
-        else:
-            hint = did_you_mean(name, WORDS)
+        missing_blank = bool(meant) and name.upper() != meant
+        meant = meant or nearest(name, WORDS)
+        self._note_broken(meant, line)
+        hint = f'; is a blank missing after "{meant}"?' if missing_blank else f'; did you mean "{meant}"?' if meant else ""
         kind = "letter" if len(name) == 1 and name.isalpha() else "start of a line"
         self._faults.add(line, token.column, f"unknown {kind} {shown(name)}{hint} (the letters: {letters})")
 

@@ -45,8 +45,9 @@ def read_textures(found: Declarations, folders: Folders, faults: Faults) -> Text
         return Textured((), {}, None)
     colors, normals = _by_material(found, "texture", faults), _by_material(found, "normalmap", faults)
     projections = _by_material(found, "project", faults)
+    pictured = {*colors, *normals, *_unread(found, "texture", "normalmap")}
     for material, call in projections.items():
-        if material not in colors and material not in normals:
+        if material not in pictured:
             faults.add(call.line, call.column, "project has no effect on a material without a texture; add a line texture above it")
     textures: list[Texture] = []
     pictures: dict[Path, Picture | None] = {}
@@ -105,6 +106,12 @@ def _by_material(found: Declarations, word: str, faults: Faults) -> dict[int, Wo
     return calls
 
 
+def _unread(found: Declarations, *words: str) -> set[int]:
+    """Indices of the materials with a line of these words that could not be read."""
+    lines = [line for word in words for line in found.broken.get(word, [])]
+    return set((np.searchsorted(found.lines_of("M"), lines) - 1).tolist())
+
+
 def _picture(call: WordCall, folders: Folders, read: dict[Path, Picture | None], faults: Faults) -> Picture | None:
     """The picture that a line names; each file is read once."""
     name = call.text("picture")
@@ -151,8 +158,9 @@ def _coordinates(
     given = _by_triangle(found, soup.lines, faults)
     for triangle, call in given.items():
         uvs[triangle] = np.array(list(call.values.values()), np.float64).reshape(3, 2)
-    without = np.isin(material, [m for m in calls if m not in projections])
-    without[list(given)] = False
+    without = np.isin(material, [m for m in calls if m not in {*projections, *_unread(found, "project")}])
+    unread = np.searchsorted(soup.lines, found.broken.get("uv", [])) - 1
+    without[[*given, *unread[unread >= 0].tolist()]] = False
     for number in np.unique(material[without]).tolist():
         line = soup.lines[without & (material == number)][0]
         faults.add(

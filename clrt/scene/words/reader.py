@@ -11,6 +11,7 @@ from clrt.scene.tokens import Token, read_in_range
 from clrt.scene.words.word import Choice, Text, Value, Word, WordCall
 
 _KEY = re.compile(r"([a-z][a-z_]*)=(.*)")
+_KEY_ALONE = re.compile(r"[a-z][a-z_]*=?")
 
 
 def read_word(words: Mapping[str, Word], tokens: Sequence[Token], line: int, faults: Faults) -> WordCall | None:
@@ -18,14 +19,12 @@ def read_word(words: Mapping[str, Word], tokens: Sequence[Token], line: int, fau
     name = tokens[0].text
     word = words.get(name)
     if word is None:
-        known = ", ".join(sorted(words))
-        faults.add(line, tokens[0].column, f"unknown word {shown(name)}{did_you_mean(name, words)} (the words: {known})")
+        known = faults.once(f" (the words: {', '.join(sorted(words))})")
+        faults.add(line, tokens[0].column, f"unknown word {shown(name)}{did_you_mean(name, words)}{known}")
         return None
     plain = [token for token in tokens[1:] if not _KEY.fullmatch(token.text)]
     if len(plain) != len(word.positional):
-        place = plain[0] if plain else tokens[0]
-        number = "1 value" if len(word.positional) == 1 else f"{len(word.positional)} values"
-        faults.add(line, place.column, f'{name} takes {number}, as in "{word.example}", found {len(plain)}')
+        _report_count(name, word, tokens, plain, line, faults)
         return None
     values: dict[str, Value | None] = {f.name: default for f, default in word.keys}
     for declared, token in zip(word.positional, plain, strict=True):
@@ -34,6 +33,28 @@ def read_word(words: Mapping[str, Word], tokens: Sequence[Token], line: int, fau
     read = {key: value for key, value in values.items() if value is not None}
     columns = {declared.name: token.column for declared, token in zip(word.positional, plain, strict=True)}
     return WordCall(name, line, tokens[0].column, read, columns) if len(read) == len(values) else None
+
+
+def _report_count(name: str, word: Word, tokens: Sequence[Token], plain: Sequence[Token], line: int, faults: Faults) -> None:
+    """Note that a line has too few or too many positional values, or that blanks tear a key=value apart, which makes them too many."""
+    torn = _torn_key(tokens[1:])
+    if torn is not None:
+        faults.add(line, torn.column, f'no blank may stand beside "="; write {shown(torn.text)}')
+        return
+    place = plain[0] if plain else tokens[0]
+    number = "1 value" if len(word.positional) == 1 else f"{len(word.positional)} values"
+    faults.add(line, place.column, f'{name} takes {number}, as in "{word.example}", found {len(plain)}')
+
+
+def _torn_key(tokens: Sequence[Token]) -> Token | None:
+    """The first key=value with a blank beside its `=`, without the blank; None where there is none."""
+    for token, *rest in (tokens[i : i + 3] for i in range(len(tokens) - 1)):
+        if not _KEY_ALONE.fullmatch(token.text) or token.text.endswith("=") == rest[0].text.startswith("="):
+            continue
+        parts = [token.text, *(part.text for part in (rest if rest[0].text == "=" else rest[:1]))]
+        if parts[-1] != "=" and not any(_KEY.fullmatch(part) for part in parts[1:]):
+            return Token("".join(parts), token.column)
+    return None
 
 
 def _read_keys(name: str, word: Word, tokens: Sequence[Token], line: int, faults: Faults) -> dict[str, Value | None]:
