@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,21 @@ import pytest
 from clrt.device.context import Device, open_device
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of a test marked `matrix(keep=k)`, which goes through many programs, k cases spread over all are quick, the others slow."""
+    cases = defaultdict[tuple[Path, str], list[pytest.Item]](list)
+    for item in items:
+        if item.get_closest_marker("matrix"):
+            cases[item.path, getattr(item, "originalname", item.name)].append(item)
+    for group in cases.values():
+        mark = group[0].get_closest_marker("matrix")
+        assert mark is not None
+        quick = {i * len(group) // mark.kwargs["keep"] for i in range(mark.kwargs["keep"])}
+        for place in set(range(len(group))) - quick:
+            group[place].add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="session")

@@ -49,6 +49,7 @@ def close(scene: Scene, expected: FloatArray, samples: int = 64, seeds: int = 6)
     assert (np.abs(whole.mean(0) - expected.mean((0, 1))) < 5.0 * whole.std(0, ddof=1) / np.sqrt(seeds) + 2e-5).all()
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", RUNGS)
 def test_square_light_over_a_floor_is_lamberts_formula(precision: str) -> None:
     scene = parse_scene(VIEW + SQUARE + FLOOR)

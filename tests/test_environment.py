@@ -53,6 +53,7 @@ def spiky(height: int, width: int, seed: int = 0) -> np.ndarray:
 # What rays see
 
 
+@pytest.mark.matrix(keep=4)
 @pytest.mark.parametrize(
     ("precision", "shape"), [*(("watertight", s) for s in SHAPES), *((p, (5, 11)) for p in sorted(RUNGS) if p != "watertight")]
 )
@@ -229,6 +230,7 @@ def assert_mean(film: Film, expected: np.ndarray) -> None:
     assert (np.abs((film.mean - expected).mean((0, 1))) < 4.0 * whole).all()
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("shape", [(1, 1), (4, 6)])
 def test_ball_in_a_uniform_environment_shows_its_colour(shape: tuple[int, int]) -> None:
     """A convex body sees all of its half space: C Kd times the radiance at every point."""
@@ -273,6 +275,7 @@ def test_box_without_a_lid_is_dark_where_it_sees_no_sky() -> None:
     assert_mean(seeds(lit(text, np.ones((1, 1, 3))), 64, 24), np.full((4, 4, 3), expected))
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize(
     ("text", "changes"),
     [(MATT, {}), (MATT, {"indirect": Indirect(), "depth": 3}), (SHINY.replace("0 0 0 1  0.9", "0 0.5 0.4 30  0.5"), {"depth": 4})],
@@ -286,6 +289,7 @@ def test_picture_agrees_with_the_path_tracer(text: str, changes: dict[str, Any])
     assert verdict.accepted, verdict.worst
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", ["fast", "exact"])
 def test_every_rung_gives_the_same_mean(precision: str) -> None:
     scene = lit(CAMERA.replace("R 40 32", "R 10 8") + MATT, spiky(3, 5, seed=9) + 0.05, samples=128)
@@ -335,6 +339,7 @@ def test_picture_does_not_depend_on_launches(device: Device) -> None:
     assert (tracer.picture() == whole).all()
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("lanes", [8, 4, 1])
 def test_every_packet_width_takes_the_same_samples(device: Device, lanes: int) -> None:
     scene = lit(CAMERA + MATT, spiky(8, 16), samples=2)

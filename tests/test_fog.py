@@ -19,6 +19,7 @@ WALL = "M 1 1 1  0 0 0 1 0\narealight 1 0.5 0.25\nT -9 -9 {0}  9 -9 {0}  9 9 {0}
 BLACK = "fog {} red=0 green=0 blue=0\n"
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", RUNGS)
 def test_way_through_fog_leaves_the_exponential(precision: str) -> None:
     scene = parse_scene("E 0 0 -3\nV 0 0 1\nF 0.01\nR 4 4\n" + WALL.format(1) + BLACK.format(0.4))
@@ -38,6 +39,7 @@ def test_light_is_weakened_on_its_way_to_a_surface() -> None:
     np.testing.assert_allclose(pixels, 0.8 * np.exp(-0.2 * 8.0), rtol=1e-5)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("asymmetry", [0.0, 0.6, -0.5])
 def test_airlight_of_a_lamp_is_its_integral(asymmetry: float) -> None:
     """A ray along x at the distance 1 from a point light of colour 1: the integral of s exp(-s x) p(cos) pi exp(-s d), by quadrature."""
@@ -56,6 +58,7 @@ def test_airlight_of_a_lamp_is_its_integral(asymmetry: float) -> None:
     assert abs(batches.mean() - expected) < 4.0 * error
 
 
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize("lamp", LAMPS)
 @pytest.mark.parametrize("fog", ["fog 0.3 red=0.9 asymmetry=0.4\n", "fog 0.3 green=0.6\nindirect\ndepth 2\n"])
 def test_foggy_room_is_that_of_the_reference(lamp: str, fog: str) -> None:

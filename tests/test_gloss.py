@@ -204,12 +204,14 @@ def furnace(material: str, depth: int = 5, samples: int = 256) -> tuple[float, f
     return float(means_of.mean()), float(means_of.std(ddof=1) / np.sqrt(6))
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("roughness", [0.001, 0.05, 0.3, 0.6, 1.0])
 def test_white_furnace_rough_mirror_loses_nothing(device: Device, roughness: float) -> None:
     mean, sigma = furnace(f"M 1 1 1 0 0 0 1 1\ngloss {roughness}")
     assert abs(mean - 1.0) < 3.0 * sigma + 4e-4  # and the bound of the table
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("roughness", [0.05, 0.6])
 def test_white_furnace_rough_glass_with_fresnel_loses_what_the_depth_cuts_off(device: Device, roughness: float) -> None:
     """Of light inside a ball, 3% go on round it for long where the glass is nearly polished."""
@@ -267,6 +269,7 @@ def test_scene_comment_holds_by_quadrature_and_on_the_device(device: Device) -> 
         assert abs(seen.mean() - value) < 4.0 * seen.std(ddof=1) / np.sqrt(6) + 3e-3 * value
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize(
     "material",
     ["M 0.9 0.8 0.7 0.1 0.4 0.3 20 0.6\ngloss 0.4", "M 0.9 0.8 0.7 0 0.1 0 20 0.2 0.7 1.5\ngloss 0.4",

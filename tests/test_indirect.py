@@ -46,6 +46,7 @@ def test_furnace_is_emission_over_what_is_lost(walls: str) -> None:
     assert abs(batches.mean() - 2.0) < 4.0 * error
 
 
+@pytest.mark.matrix(keep=3)
 @pytest.mark.parametrize("precision", RUNGS)
 @pytest.mark.parametrize("depth", [0, 1, 2, 3])
 def test_depth_ends_the_series(precision: str, depth: int) -> None:
@@ -100,6 +101,7 @@ LAMPS = {
 }
 
 
+@pytest.mark.matrix(keep=4)
 @pytest.mark.parametrize("lamp", LAMPS)
 @pytest.mark.parametrize("end", ["indirect\n", "indirect\ndepth 1\n", ""])
 def test_room_is_that_of_the_reference(lamp: str, end: str) -> None:
@@ -154,6 +156,7 @@ BEHIND_PANES = (
 LAMP = "M 0 0 0  0 0 0 1 0\narealight 2 2 2\nS 0 0 -9 3\n"
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("opacity", [0.0, 0.4])
 @pytest.mark.parametrize("depth", [1, 3])
 def test_surfaces_behind_panes_lose_no_light_when_the_depth_ends(opacity: float, depth: int) -> None:

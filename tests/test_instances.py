@@ -105,6 +105,7 @@ def _slow(values: Iterable[Any], quick: Iterable[Any]) -> list[Any]:
     return [value if value in quick else pytest.param(value, marks=pytest.mark.slow) for value in values]
 
 
+@pytest.mark.matrix(keep=3)
 @pytest.mark.parametrize("name", _slow(SCENES, QUICK))
 def test_instances_match_reference_and_scene_written_out(name: str) -> None:
     scene = parse_scene(SCENES[name])
@@ -116,6 +117,7 @@ def test_instances_match_reference_and_scene_written_out(name: str) -> None:
     _compare(scene, pixels, reference.margin, written, 1e-4 if "glass" in name or "mirror" in name else BOUND)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", _slow(sorted(RUNGS), ("exact",)))
 def test_every_rung_matches_the_reference(precision: str) -> None:
     scene = parse_scene(SCENES["glass"]).with_size(32, 32)
@@ -123,6 +125,7 @@ def test_every_rung_matches_the_reference(precision: str) -> None:
     _compare(scene, clrt.render(scene, precision=precision).pixels, reference.margin, reference.pixels, 1e-4)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("lanes", _slow((16, 8, 4, 1), (4,)))
 def test_every_packet_width_matches_the_reference(device: Device, lanes: int) -> None:
     scene = parse_scene(SCENES["smooth"]).with_size(37, 29)
@@ -247,6 +250,7 @@ def test_ten_thousand_rabbits_take_the_memory_of_one(device: Device) -> None:
     assert all_of_them.picture().std() > 0.05
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", _slow(("watertight", "exact"), ("watertight",)))
 def test_tree_over_many_objects_gives_the_picture_of_the_loop(monkeypatch: pytest.MonkeyPatch, precision: str) -> None:
     """Objects and spheres that overlap, some of them twice in the same place: of equal distances the lowest id counts in either."""

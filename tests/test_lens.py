@@ -48,6 +48,7 @@ def _quiet(phase: str, fraction: float) -> None:
     """No progress."""
 
 
+@pytest.mark.matrix(keep=3)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 @pytest.mark.parametrize("text", [FLAT, BOUNCING, OBLIQUE], ids=["flat", "bouncing", "oblique"])
 def test_samples_match_the_reference(text: str, precision: str) -> None:
@@ -55,6 +56,7 @@ def test_samples_match_the_reference(text: str, precision: str) -> None:
     _agrees(scene, clrt.render(scene, precision=precision, seed=7).pixels, 7, 24 if rung(precision).bits == 32 else 32, precision)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_the_reference(device: Device, lanes: int) -> None:
     scene = replace(parse_scene(BOUNCING).with_size(21, 13), samples=2, seed=3)

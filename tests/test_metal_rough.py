@@ -70,12 +70,14 @@ def furnace(material: str, extra: str = "") -> tuple[float, float]:
     return float(seen.mean()), float(seen.std(ddof=1) / np.sqrt(6))
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("roughness", [0.0, 0.4, 1.0])
 def test_white_furnace_white_metal_loses_nothing(device: Device, roughness: float) -> None:
     mean, sigma = furnace(f"M 1 1 1 0 0 0 1 0\nmaterial metallic=1 roughness={roughness}")
     assert abs(mean - 1.0) < 3.0 * sigma + 4e-4
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("metallic", [0.0, 0.5])
 @pytest.mark.parametrize("roughness", [0.0, 0.2, 0.5, 1.0])
 def test_white_furnace_gives_back_one_at_most(device: Device, roughness: float, metallic: float) -> None:
@@ -89,6 +91,7 @@ def test_white_furnace_gives_back_one_at_most(device: Device, roughness: float, 
     assert batches.mean() > least
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("word", ["metallic=0.6 roughness=0.5", "metallic=0 roughness=0.2"])
 def test_lamps_on_balls_are_those_of_the_path_reference(device: Device, word: str) -> None:
     lamps = "L 2 3 -3 1 0.9 0.8\nsun 1 1 -1\nspot -3 3 -2 2 -3 2 30 softness=0.5\n"
@@ -97,6 +100,7 @@ def test_lamps_on_balls_are_those_of_the_path_reference(device: Device, word: st
     assert_same(device_batches(scene, 64, range(8)), reference.mean, reference.variance_of_mean)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize(
     ("word", "extra"),
     [("metallic=1 roughness=0.4", ""), pytest.param("metallic=0.1 roughness=0.6", "indirect\n", marks=pytest.mark.slow)],
@@ -194,6 +198,7 @@ def test_picture_of_emission_multiplies_what_is_seen_of_it(device: Device) -> No
     np.testing.assert_allclose(clrt.render(behind).pixels[0, 0], [0.2, 0.6, 2.0], rtol=1e-6)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("picture", ["metal_rough_map", "emission_map"])
 def test_pictures_lie_on_an_instance_as_on_the_object(picture: str, device: Device) -> None:
     """A picture of four texels on an object far from where its instance stands: as if the triangles stood there themselves."""

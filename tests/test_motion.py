@@ -68,12 +68,14 @@ def _quiet(phase: str, fraction: float) -> None:
     """No progress."""
 
 
+@pytest.mark.matrix(keep=3)
 @pytest.mark.parametrize("name", SCENES)
 def test_samples_match_the_reference(name: str) -> None:
     scene, reference = _seen(name, 24)
     _agrees(clrt.render(scene, samples=1, seed=7).pixels, reference)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 @pytest.mark.parametrize("name", ["eye", "eye alone"])
 def test_rungs_match_the_reference(name: str, precision: str) -> None:
@@ -81,6 +83,7 @@ def test_rungs_match_the_reference(name: str, precision: str) -> None:
     _agrees(clrt.render(scene, samples=1, precision=precision, seed=7).pixels, reference, precision)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_the_reference(device: Device, lanes: int) -> None:
     scene, reference = _seen("smooth", 24)

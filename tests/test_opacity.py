@@ -58,6 +58,7 @@ def _compare(scene: Scene, pixels: np.ndarray) -> None:
     assert expected.pixels.std() > 0.05
 
 
+@pytest.mark.matrix(keep=3)
 @pytest.mark.parametrize(
     "look",
     [
@@ -76,6 +77,7 @@ def test_picture_matches_reference(write: Write, look: str) -> None:
     _compare(scene, clrt.render(scene).pixels)
 
 
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize(("precision", "lanes"), [*((name, 16) for name in sorted(RUNGS)), ("watertight", 8), ("exact", 4), ("double", 1)])
 def test_every_rung_and_width_matches_reference(write: Write, device: Device, precision: str, lanes: int) -> None:
     scene = write(HEAD + LIGHTS + MATERIAL + "opacity 0.4\ntexture soft.png alpha=yes\n" + THINGS + FLOOR).with_size(16, 16)
@@ -86,6 +88,7 @@ def test_every_rung_and_width_matches_reference(write: Write, device: Device, pr
     _compare(scene, tracer.picture())
 
 
+@pytest.mark.slow
 def test_glass_with_opacity_of_shadow_lets_light_through(write: Write) -> None:
     glass = "M 1 1 1 0 0 0.5 60 0.1 0.8 1.5\n"
     scene = write(HEAD + LIGHTS + glass + "opacity 0.3 of=shadow\nS 0 0 3 0.8\n" + FLOOR)
@@ -94,11 +97,13 @@ def test_glass_with_opacity_of_shadow_lets_light_through(write: Write) -> None:
     assert (clrt.render(scene).pixels - clrt.render(dark).pixels).max() > 0.1
 
 
+@pytest.mark.slow
 def test_glass_seen_through_takes_no_medium_along(write: Write) -> None:
     scene = write(HEAD + LIGHTS + "M 0.5 0.8 1 0 0.2 0.5 60 0.1 0.8 1.5\nabsorb 0.5 0.2 0.1\nopacity 0.6\nS 0 0 3 0.8\n" + FLOOR)
     _compare(scene, clrt.render(scene).pixels)
 
 
+@pytest.mark.slow
 def test_instances_match_reference(write: Write) -> None:
     things = "object leaf\n" + THINGS.replace("S 0.6", "O\nS 0.6") + "instance leaf 1.2 0.1 0.3 scale=1.3 turn_z=20\n"
     things += "instance leaf 0.5 0.2 0.4 turn_y=15 scale_x=0.8\n"
@@ -115,6 +120,7 @@ def _lit() -> float:
     return 4.0 / np.sqrt(20.0)
 
 
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_panes_in_the_way_multiply(precision: str, count: int) -> None:
@@ -122,12 +128,14 @@ def test_panes_in_the_way_multiply(precision: str, count: int) -> None:
     assert abs(_pixel(BELOW + "opacity 0.3\n" + panes, precision) - 0.7**count * _lit()) < 2e-6
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 def test_panes_in_one_place_count_each(precision: str) -> None:
     pane = "T -3 2 -3 3 2 -3 0 2 5\n"
     assert abs(_pixel(BELOW + "opacity 0.3\n" + pane + "O\n" + pane + pane, precision) - 0.7**3 * _lit()) < 2e-6
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 def test_sphere_in_the_way_is_two_surfaces(precision: str) -> None:
     assert abs(_pixel(BELOW + "opacity 0.3\nS 0 3 -0.5 0.4\n", precision) - 0.7**2 * _lit()) < 2e-6
@@ -146,6 +154,7 @@ CEILING = "T -90 9 -90 90 9 -90 0 9 90\n"
 PANE = "T -90 2 -90 90 2 -90 0 2 90\n"
 
 
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize(
     ("light", "metal"),
     [("L 0 4 0\n", "material roughness=0.4\n"), ("sun 0 1 -0.5\n", "material metallic=1 roughness=0.5\n"), ("sun 0 1 -0.5\n", "")],

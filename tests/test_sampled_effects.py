@@ -25,6 +25,7 @@ def allowed(name: str) -> float:
     return max((error for word, error in TABLES.items() if word in name), default=4e-6)
 
 
+@pytest.mark.matrix(keep=4)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow]) for name in SCENES])
 def test_means_agree_with_the_reference(name: str) -> None:
     picture = render_paths(SCENES[name], 800 if name in QUICK else 2500, 1)
@@ -68,6 +69,7 @@ def furnace(material: Material, by_background: bool) -> Scene:
     return replace(s, indirect=Indirect(line=1), samples_line=1, environment=around)
 
 
+@pytest.mark.matrix(keep=4)
 @pytest.mark.parametrize("by_background", [True, False], ids=["background", "environment"])
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name == "matte" else [pytest.mark.slow]) for name in WHITE])
 def test_white_furnace_gains_nothing_and_loses_nothing_unsaid(name: str, by_background: bool) -> None:

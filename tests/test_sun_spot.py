@@ -69,6 +69,7 @@ def _compare(pixels: np.ndarray, reference: ReferencePicture) -> None:
 # Pictures against the reference
 
 
+@pytest.mark.matrix(keep=3)
 @pytest.mark.parametrize("lamp", LAMPS)
 @pytest.mark.parametrize("body", BODIES)
 def test_picture_matches_reference(body: str, lamp: str) -> None:
@@ -76,6 +77,7 @@ def test_picture_matches_reference(body: str, lamp: str) -> None:
     _compare(clrt.render(scene).pixels, reference)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 @pytest.mark.parametrize("body", ["balls", "smooth mesh"])
 def test_every_rung_matches_reference(precision: str, body: str) -> None:
@@ -83,6 +85,7 @@ def test_every_rung_matches_reference(precision: str, body: str) -> None:
     _compare(clrt.render(scene, precision=precision).pixels, reference)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_reference(device: Device, lanes: int) -> None:
     scene, reference = _reference("balls", "all")
@@ -210,6 +213,7 @@ def test_malformed_line_is_refused_at_its_place(line: str, expected: str) -> Non
 # Rays and programs
 
 
+@pytest.mark.slow
 def test_rays_are_traced_only_where_a_lamp_can_light() -> None:
     """A wall that fills the view, and a square behind the eye that throws no shadow: one ray a lit pixel, none outside the cone."""
     behind = "T -1 -1 -30 -1 1 -30 1 1 -30\n"

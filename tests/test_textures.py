@@ -56,6 +56,7 @@ def _compare(scene: Scene, pixels: np.ndarray) -> None:
     assert expected.pixels.std() > 0.05
 
 
+@pytest.mark.matrix(keep=4)
 @pytest.mark.parametrize("picture", ["eight.png", "sixteen.png"])
 @pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
 @pytest.mark.parametrize("look", ["filter=linear srgb=yes", "filter=nearest srgb=no"])
@@ -64,6 +65,7 @@ def test_picture_matches_reference(write: Write, picture: str, wrap: str, look: 
     _compare(scene, clrt.render(scene).pixels)
 
 
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize(("precision", "lanes"), [*((name, 16) for name in sorted(RUNGS)), ("watertight", 8), ("exact", 4), ("double", 1)])
 def test_every_rung_and_width_matches_reference(write: Write, device: Device, precision: str, lanes: int) -> None:
     scene = write(HEAD + "texture eight.png\n" + THINGS).with_size(32, 32)
