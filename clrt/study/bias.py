@@ -27,6 +27,12 @@ def bias_part(levels: Sequence[int], gram: FloatArray, squared_floor: float, nam
     return {"rows": rows, "verdict": verdict(rows, squared_floor, named)}
 
 
+def gram_of(errors: Sequence[NDArray[np.float32]]) -> FloatArray:
+    """(seeds, seeds): means over the picture of products of two seeds' errors, in float64."""
+    flat = np.stack([each.ravel() for each in errors]).astype(np.float64)
+    return np.asarray(flat @ flat.T / flat.shape[1])
+
+
 def decomposition(gram: FloatArray, squared_floor: float) -> dict[str, Number]:
     """squared_error, bias_squared, variance of one number of samples, the reference's own error taken off."""
     def same(values: FloatArray) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,9 +10,10 @@ import numpy as np
 from clrt.features import Features
 from clrt.precision import DEFAULT
 from clrt.study import metrics
-from clrt.study.numbers import bootstrapped, counted, in_turns, measured
+from clrt.study.bias import decomposition, gram_of
+from clrt.study.numbers import Number, counted, in_turns, measured, number
 from clrt.study.reference import Reference
-from clrt.study.subject import FIRST_SEED, Shot, Subject
+from clrt.study.subject import FIRST_SEED, Picture, Shot, Subject
 
 
 def measure(subject: Subject, reference: Reference) -> dict[str, Any]:
@@ -32,8 +32,8 @@ def measure(subject: Subject, reference: Reference) -> dict[str, Any]:
     sampled = bool(subject.sampled_effects) or scene.samples > 1
     errors = _sampled_errors(subject, shots, reference) if sampled else _plain_errors(shots)
     rows = [{"depth": d, "seconds": measured(series[str(d)].seconds, "s"), "error": errors[d]} for d in depths]
-    judge = f"the reference, with noise, at {scene.samples} samples" if sampled else f"the picture of depth {depths[-1]}"
-    return {"rows": rows, "against": f"root mean square error against {judge}"}
+    whole = f"RMSE against the picture of depth {depths[-1]}"
+    return {"rows": rows, "against": "root of the squared bias against the reference, noise left out" if sampled else whole}
 
 
 def depths_of(deepest: int, most: int) -> list[int]:
@@ -50,11 +50,18 @@ def _plain_errors(shots: dict[int, Shot]) -> dict[int, Any]:
 
 
 def _sampled_errors(subject: Subject, shots: dict[int, Shot], reference: Reference) -> dict[int, Any]:
-    """A picture a seed and depth, in turns; all with one number of samples."""
-    errors: dict[int, list[float]] = {depth: [] for depth in shots}
+    """What each depth leaves out, without the noise of its few samples: the root of the squared bias over independent seeds."""
     truth, seeds = reference.mean, subject.plan.seeds
+    errors: dict[int, list[Picture]] = {depth: [] for depth in shots}
     for seed in range(seeds):
         subject.tell("depth: errors", 0.6 + 0.4 * seed / seeds)
-        for depth, draw in ((d, partial(shot.picture, subject.samples, FIRST_SEED + seed)) for d, shot in shots.items()):
-            errors[depth].append(metrics.rmse(draw(), truth))
-    return {depth: bootstrapped(values, "radiance") for depth, values in errors.items()}
+        for depth, shot in shots.items():
+            errors[depth].append((shot.picture(subject.samples, FIRST_SEED + seed) - truth).astype(np.float32))
+    floor = reference.squared_floor
+    return {depth: _root(decomposition(gram_of(each), floor)["bias_squared"]) for depth, each in errors.items()}
+
+
+def _root(square: Number) -> Number:
+    """The root of a squared number, 0 where its estimate comes out below zero."""
+    low, median, high = (max(0.0, square[key]) ** 0.5 for key in ("low", "median", "high"))
+    return number(median, low, high, "radiance", square["runs"])

@@ -16,7 +16,7 @@ from clrt.features import Features
 from clrt.precision import DEFAULT
 from clrt.stats import RunStats
 from clrt.study import metrics
-from clrt.study.bias import bias_part
+from clrt.study.bias import bias_part, gram_of
 from clrt.study.numbers import bootstrapped, measured, number, resamples
 from clrt.study.reference import RUNG, Reference, reference_of
 from clrt.study.subject import FIRST_SEED, Picture, Shot, Subject
@@ -93,17 +93,11 @@ def _points(subject: Subject, shot: Shot, reference: Reference, levels: tuple[in
             errors[i].append((picture - truth).astype(np.float32))
     arrays = {name: np.array(values) for name, values in found.items()}
     return Points(levels, arrays["seconds"], arrays["rmse"], arrays["relative"], arrays["p99"],
-                  arrays["flip"] if arrays["flip"].size else None, np.stack([_gram(each) for each in errors]))  # fmt: skip
+                  arrays["flip"] if arrays["flip"].size else None, np.stack([gram_of(each) for each in errors]))  # fmt: skip
 
 
 def _keep(pictures: dict[str, Picture], name: str, shot: Shot, samples: int, seed: int) -> None:
     pictures[name] = shot.picture(samples, seed)
-
-
-def _gram(errors: list[Picture]) -> FloatArray:
-    """(seeds, seeds): means over the picture of products of two seeds' errors, in float64."""
-    flat = np.stack([each.ravel() for each in errors]).astype(np.float64)
-    return np.asarray(flat @ flat.T / flat.shape[1])
 
 
 def _rows(points: Points) -> list[dict[str, Any]]:
