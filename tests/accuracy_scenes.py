@@ -35,12 +35,21 @@ def lamp_over_floor() -> Scene:
 
 
 def soft_shadow(fov: float = 45.0) -> Scene:
-    """A ball's shadow from a triangular lamp on a floor, and light all over from elsewhere."""
+    """A ball's shadow from a triangular lamp on a floor that fills the picture."""
+    return _ball_and_lamp(fov, (0, 2.2, -4), (0, -0.55, 1))
+
+
+def shadow_under_sky() -> Scene:
+    """The same from farther off: a shadow in a wide view, half of it sky."""
+    return replace(_ball_and_lamp(50.0, (0, 1.2, -6), (0, -0.05, 1)), background=(0.2, 0.25, 0.35))
+
+
+def _ball_and_lamp(fov: float, eye: tuple[float, float, float], view: tuple[float, float, float]) -> Scene:
     lamp_at = np.array([[(-0.5, 3.0, -0.5), (0.5, 3.0, -0.5), (0.0, 3.0, 0.6)]], np.float64)
     floor = quad((-9, 0, -9), (9, 0, -9), (9, 0, 9), (-9, 0, 9))
     parts = objects((lamp_at, 1), (floor, 0))
     s = scene(parts, [Material((0.9, 0.8, 0.6), 0.1, 0.6, 0.0, 1.0), lamp(8.0, 8.0, 8.0), matte(diffuse=0.7)], [],
-              spheres((0.0, 0.7, 0.0, 0.4, 2)), eye=(0, 2.2, -4), view=(0, -0.55, 1), fov=fov, size=SIZE)  # fmt: skip
+              spheres((0.0, 0.7, 0.0, 0.4, 2)), eye=eye, view=view, fov=fov, size=SIZE)  # fmt: skip
     return replace(s, samples_line=1, samples=2)
 
 
