@@ -25,6 +25,7 @@ from clrt.timing import interleave
 FloatArray = NDArray[np.float64]
 
 _ABOVE_FLOOR = 2.0  #: times the floor: points nearer to it say more of the reference than of themselves
+SEEDS_APART = 32  #: more than there are levels: what a point's seeds are does not depend on how many others there are
 _PILOT = 2  #: samples that are timed before it is decided how many the largest point has
 
 
@@ -80,7 +81,7 @@ def _points(subject: Subject, shot: Shot, reference: Reference, levels: tuple[in
     for seed in range(seeds):
         subject.tell("samples: the points", seed / seeds)
         pictures: dict[str, Picture] = {}
-        turns = {str(n): partial(_keep, pictures, str(n), shot, n, FIRST_SEED + seed * len(levels) + i) for i, n in enumerate(levels)}
+        turns = {str(n): partial(_keep, pictures, str(n), shot, n, FIRST_SEED + seed * SEEDS_APART + i) for i, n in enumerate(levels)}
         series = interleave(turns, 1, warm_ups=0)
         for i, n in enumerate(levels):
             picture = pictures[str(n)]
