@@ -17,7 +17,7 @@ run: $(VENV)/run.stamp ## install into .venv and render a first picture into out
 	$(BIN)/clrt $(SCENE) -o $(PICTURE)
 
 test: $(VENV)/dev.stamp ## the quick tests
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest -m "not slow" -n auto --dist loadfile
 
 test-all: $(VENV)/dev.stamp ## all tests, the slow ones, too
 	$(BIN)/python -m pytest

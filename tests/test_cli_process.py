@@ -63,7 +63,7 @@ def render(scene, progress, **arguments):
 """
 BLOCKED_IN_WRITING = """
 render = picture
-def write(file, pixels, srgb):
+def write(file, pixels, srgb, comment):
     file.write(b"half of a picture")
     file.flush()
     ready()

@@ -8,6 +8,7 @@ import pytest
 import clrt
 from clrt.generate import uv_sphere
 from clrt.reference import exact
+from clrt.scene.build import parse_scene
 
 
 @pytest.mark.parametrize("sine", [1e-7, 1e-10, 1e-13, 1e-14, 1e-16])
@@ -53,3 +54,14 @@ def test_fast_loses_rays_from_next_to_a_surface() -> None:
     vertices, faces = uv_sphere(1200)
     on = vertices[faces].mean(axis=1)
     assert not clrt.RayCaster((vertices, faces), precision="fast").any_hit(on * (1 - 1e-9), on).all()
+
+
+def test_triangle_seen_edge_on_hides_nothing_far_beside_it() -> None:
+    """A leaf of size 0.14 in one object with a floor of 600, at the height of a lens: what is metres beside it keeps its colour."""
+    scene = parse_scene(
+        "E 0 0.8 -5\nV 0 0 1\nF 46\nR 96 33\nsamples 16\nbackground 1 0.6 0.4\nlens 0.02 10\nM 0.5 0.5 0.5  1 0 0 1  0\n"
+        "T -300 0 -20   300 0 -20   300 0 600\nM 0.1 0.1 0.1  1 0 0 1  0\nT 3.33 0.8 5.43   3.47 0.8 5.43   3.47 0.8 5.57\n"
+    )
+    left = clrt.render(scene).pixels[14:19, :48]  # the leaf stands to the right
+    exact_left = clrt.render(scene, precision="exact").pixels[14:19, :48]
+    assert (np.abs(left - exact_left) < 0.1).all(), "no more than a sample at an edge"

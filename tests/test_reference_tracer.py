@@ -201,11 +201,11 @@ def test_only_needed_rays_are_traced():
     picture = render(s)
     seen = int((picture.prim_id >= 0).sum())
     assert 0 < seen < 256
-    assert picture.rays == {"primary": 256, "shadow": seen, "reflected": 0, "refracted": 0}
+    assert picture.rays == {"primary": 256, "shadow": seen, "reflected": 0, "refracted": 0, "passed": 0}
     shiny = render(scene([floor], [mirror(0.5)], [(0, 5, 0)], size=(16, 16), depth=3)).rays
-    assert shiny == {"primary": 256, "shadow": 0, "reflected": seen, "refracted": 0}
+    assert shiny == {"primary": 256, "shadow": 0, "reflected": seen, "refracted": 0, "passed": 0}
     flat = render(scene([floor], [replace(glass(1.5), reflect=0.5)], [(0, 5, 0)], size=(16, 16), depth=0)).rays
-    assert flat == {"primary": 256, "shadow": 0, "reflected": 0, "refracted": 0}
+    assert flat == {"primary": 256, "shadow": 0, "reflected": 0, "refracted": 0, "passed": 0}
 
 
 @pytest.mark.parametrize(
