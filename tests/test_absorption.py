@@ -126,11 +126,13 @@ def matches_the_reference(s: Scene, precision: str, device: Device) -> None:
     assert wrong.mean() < 0.02
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 def test_every_rung_matches_the_reference(device: Device, precision: str) -> None:
     matches_the_reference(parse_scene(NESTED), precision, device)
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_the_reference(lanes: int) -> None:
     opened = open_device()

@@ -66,6 +66,7 @@ def test_open_mesh_holds_no_eye() -> None:
     assert _both(_scene(GLASS + "T -1 -1 -1 1 -1 -1 0 1 1\nT -1 -1 -1 1 -1 -1 0 0.2 3\n", "0 0 0.5"))[1] == []
 
 
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize(
     ("body", "eye"),
     [

@@ -167,6 +167,7 @@ def test_pane_before_everything_dims_all_lights_alike(light: str, metal: str) ->
     assert abs(dim - 0.7 * clear) < 1e-6 * clear
 
 
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("metal", ["", "material roughness=0.4\n"])
 def test_pane_dims_area_lights_and_environments(write: Write, metal: str) -> None:
     text = BELOW.replace("L 0 4 0\n", "").replace("M 1 1 1 0 1 0 1 0\n", "M 1 1 1 0 1 0.3 5 0\n" + metal)

@@ -61,6 +61,7 @@ WIDTHS = (16, 8, 4, 1)
 MIXED = mixed_sets(16)
 
 
+@pytest.mark.matrix(keep=39)
 @pytest.mark.parametrize("name", [f.name for f in FEATURES])
 def test_each_effect_with_what_it_needs_compiles_for_any_width(device: Device, name: str) -> None:
     features = with_needs([name])

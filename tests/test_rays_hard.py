@@ -11,6 +11,7 @@ from clrt.reference import exact
 from clrt.scene.build import parse_scene
 
 
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize("sine", [1e-7, 1e-10, 1e-13, 1e-14, 1e-16])
 def test_needle_before_a_wall_is_seen(sine: float) -> None:
     """The wall stands first in the leaf, so that the needle has to beat it: its normal is known to no more than sine / 2^-53."""

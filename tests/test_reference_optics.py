@@ -207,6 +207,7 @@ def mixed(choice, a, b):
     return replace(a, pixels=np.where(choice[None, :, None], a.pixels, b.pixels), margin=np.where(choice, a.margin, b.margin))
 
 
+@pytest.mark.slow
 def test_margins_are_small_on_both_sides_of_every_jump():
     """Whatever jumps between two rays 1e-7 apart was decided by less: outlines, shadows, in mirrors and glass, total reflection."""
     a, b, angle = bisected_jumps(mixed_scene())

@@ -96,6 +96,7 @@ def test_rabbit_like_mesh_matches_reference() -> None:
     _compare(scene, clrt.render(scene).pixels)
 
 
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_gives_the_same_picture(device: Device, lanes: int) -> None:
     """Widths differ only in how operations are fused, so pictures agree but for pixels at an edge."""
@@ -128,6 +129,7 @@ def test_counts_of_rays_and_tests() -> None:
     assert two.ray_counts == {"primary": 64 * 64, "shadow": 64 * 64}
 
 
+@pytest.mark.slow
 def test_counts_go_beyond_32_bits() -> None:
     """9,000 equal triangles that fill the view, behind each other's place: each primary ray tests all of them."""
     text = CAMERA.replace("64 64", "1024 512") + PLAIN + "T -50 -50 3 50 -50 3 0 90 3\n" * 9000

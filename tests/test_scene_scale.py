@@ -24,6 +24,7 @@ def _text(unit: float, spheres: bool) -> str:
     return "\n".join(lines)
 
 
+@pytest.mark.matrix(keep=3)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 @pytest.mark.parametrize("spheres", [False, True])
 def test_unit_of_a_scene_does_not_matter(precision: str, spheres: bool) -> None:

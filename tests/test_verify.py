@@ -21,7 +21,7 @@ from clrt.verify.run import LAST_CASE, catalogue, chosen, context_for, failures,
 
 RAYS = 12_000  #: where the rarest naive failures still show
 CASES = catalogue()
-SLOW = {38, 6, 34, 35, 36, 37, 49, 50, 51, 52, 57, 58}  #: many programs to compile
+SLOW = {6, 34, 35, 36, 37, 38, 40, 49, 50, 51, 52, 57, 58}  #: many programs to compile
 
 
 @pytest.fixture(scope="module")

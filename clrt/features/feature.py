@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -86,12 +87,17 @@ class Joint:
         return min(there, default=None)
 
 
+_USED: WeakKeyDictionary[Scene, tuple[Material, ...]] = WeakKeyDictionary()  #: nearly every effect asks, of all triangles
+
+
 def used_materials(scene: Scene) -> Iterator[Material]:
     """The materials of a scene that some primitive has."""
-    used: set[int] = set(np.unique(scene.spheres.material_ids).tolist())
-    for item in scene.objects:
-        used |= set(np.unique(item.material_ids).tolist())
-    return (scene.materials[i] for i in sorted(used))
+    if scene not in _USED:
+        used: set[int] = set(np.unique(scene.spheres.material_ids).tolist())
+        for item in scene.objects:
+            used |= set(np.unique(item.material_ids).tolist())
+        _USED[scene] = tuple(scene.materials[i] for i in sorted(used))
+    return iter(_USED[scene])
 
 
 def material_caller(attribute: str) -> Caller:
