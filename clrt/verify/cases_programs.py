@@ -16,7 +16,7 @@ from clrt.device import program
 from clrt.device.context import open_device
 from clrt.device.session import Tracer
 from clrt.errors import DeviceError
-from clrt.features import FEATURES, Features
+from clrt.features import Features
 from clrt.film import Film
 from clrt.precision import rung as rung_named
 from clrt.scene.build import parse_scene
@@ -207,10 +207,8 @@ def all_effects(context: Context) -> Outcome:
         pictures.camera(np.array((0.4, 0.7, -3.0)), np.array((0.0, -0.2, 1.0)), 45.0, 64, np.array((0.0, 1.0, 0.0)))
         + "L 3 4 -4\nM 0.9 0.8 0.7 0.1 0.7 0.4 30 0\n" + pictures.triangles(0.6 * pictures.cube() @ pictures.rotation(context.rng(58)))
     )  # fmt: skip
-    every = Features(tuple((f.name, 0) for f in FEATURES))
-
     def differences(rung: str, scene: Scene, fused: bool = False) -> int:
-        plain, full = _tracer(context, scene, rung), _tracer(context, scene, rung, every)
+        plain, full = _tracer(context, scene, rung), _tracer(context, scene, rung, Features.of(scene).with_every())
         if fused:
             full.kernel = _contracted(full)
         one, other = (_in_bands(t, [0], 64) for t in (plain, full))
