@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,8 +50,17 @@ def _standing(scene: Scene) -> Iterator[tuple[MeshObject, FloatArray]]:
     yield from ((scene.objects[instance.object], instance.world_from_object) for instance in scene.instances)
 
 
+_FOUND: WeakKeyDictionary[Scene, Emitters] = WeakKeyDictionary()  #: the frame asks twice, the packer once
+
+
 def emitters_of(scene: Scene) -> Emitters:
-    """The emitters of a scene, those of instances where they stand."""
+    """The emitters of a scene, those of instances where they stand; gathered once a scene."""
+    if scene not in _FOUND:
+        _FOUND[scene] = _gathered(scene)
+    return _FOUND[scene]
+
+
+def _gathered(scene: Scene) -> Emitters:
     shining, radiance = _shining(scene), np.array([m.emission for m in scene.materials]).reshape(-1, 3)
     corners, ids = [np.zeros((0, 3, 3))], [np.zeros(0, np.int64)]
     for item, matrix in _standing(scene):
