@@ -6,8 +6,12 @@ import math
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
+
+
+class Told(float):
+    """Seconds that a contender in a process of its own tells: taken in place of the clock's, which would count the asking, too."""
 
 
 @dataclass(frozen=True)
@@ -37,15 +41,18 @@ def interleave(
     warm_ups: int = 1,
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, Series]:
-    """Run A B C A B C ...: `warm_ups` rounds that are not kept, then `rounds` that are. Raises ValueError for no rounds."""
+    """Run A B C A B C ...: `warm_ups` rounds that are not kept, then `rounds` that are; a contender may return `Told` seconds.
+
+    Raises ValueError for no rounds.
+    """
     if rounds < 1:
         raise ValueError(f"{rounds} rounds measure nothing; give 1 or more")
     taken: dict[str, list[float]] = {name: [] for name in contenders}
     for turn in range(warm_ups + rounds):
         for name, run in contenders.items():
             start = clock()
-            run()
-            seconds = clock() - start
+            told = run()
+            seconds = float(told) if isinstance(told, Told) else clock() - start
             if turn >= warm_ups:
                 taken[name].append(seconds)
     return {name: Series(tuple(seconds)) for name, seconds in taken.items()}
@@ -67,3 +74,34 @@ def median_interval(values: Sequence[float], level: float = 0.95) -> tuple[float
     if k == 0:
         raise ValueError(f"{count} values do not bound their median at a level of {level:g}; take {FEWEST} or more")
     return ordered[k - 1], ordered[count - k]
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """The median of ratios, and low <= median <= high; `sure`: the interval holds the true median with 95%, else it is the range."""
+
+    median: float
+    low: float
+    high: float
+    sure: bool
+
+    @property
+    def inverse(self) -> Ratio:
+        return Ratio(1.0 / self.median, 1.0 / self.high, 1.0 / self.low, self.sure)
+
+    def times(self, factor: float) -> Ratio:
+        """All of it times a positive factor."""
+        return Ratio(self.median * factor, self.low * factor, self.high * factor, self.sure)
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+def paired(a: Sequence[float], b: Sequence[float]) -> Ratio:
+    """a over b, round by round: what slowed a whole round falls on both. Raises ValueError for none, or unequally many."""
+    ratios = [x / y for x, y in zip(a, b, strict=True)]
+    if not ratios:
+        raise ValueError("no rounds to compare; give 1 or more")
+    sure = len(ratios) >= FEWEST
+    low, high = median_interval(ratios) if sure else (min(ratios), max(ratios))
+    return Ratio(statistics.median(ratios), low, high, sure)
