@@ -12,6 +12,7 @@ import pytest
 from PIL import Image as PillowImage
 
 import clrt
+from clrt.image import png
 from clrt.image.image import Image, check_format
 
 
@@ -91,16 +92,26 @@ def test_save_ppm_and_png_hold_the_same_bytes(tmp_path: Path) -> None:
     image.save(str(tmp_path / "a.PNG"))
     expected = np.array([exact_byte(v) for v in image.pixels.ravel()]).reshape(image.pixels.shape)
     assert np.array_equal(read_ppm((tmp_path / "a.ppm").read_bytes()), expected)
-    with PillowImage.open(tmp_path / "a.PNG") as png:
-        assert (png.format, png.mode, png.size) == ("PNG", "RGB", (7, 5))
-        assert np.array_equal(np.asarray(png), expected)
-        assert "srgb" not in png.info
+    with PillowImage.open(tmp_path / "a.PNG") as read:
+        assert (read.format, read.mode, read.size) == ("PNG", "RGB", (7, 5))
+        assert np.array_equal(np.asarray(read), expected)
+        assert "srgb" not in read.info
+
+
+@pytest.mark.parametrize("size", [(1, 1), (3, 300), (700, 2), (257, 256)])
+def test_png_of_any_size_holds_the_pixels(size: tuple[int, int]) -> None:
+    """Heights around a block of rows; read back by another program."""
+    pixels = np.random.default_rng(4).integers(0, 256, (*size, 3), np.uint8)
+    with PillowImage.open(io.BytesIO(png.encode(pixels, comment="a note"))) as read:
+        assert np.array_equal(np.asarray(read), pixels)
+        assert read.text == {"Comment": "a note"}
+        read.load()
 
 
 def test_save_srgb_png_says_so(tmp_path: Path) -> None:
     Image(gradient()).save(tmp_path / "a.png", srgb=True)
-    with PillowImage.open(tmp_path / "a.png") as png:
-        assert png.info["srgb"] == 0
+    with PillowImage.open(tmp_path / "a.png") as read:
+        assert read.info["srgb"] == 0
 
 
 def test_save_twice_gives_the_same_file(tmp_path: Path) -> None:
@@ -110,8 +121,8 @@ def test_save_twice_gives_the_same_file(tmp_path: Path) -> None:
 
 
 def test_repr_png_is_a_png() -> None:
-    with PillowImage.open(io.BytesIO(Image(gradient())._repr_png_())) as png:
-        assert png.size == (7, 5)
+    with PillowImage.open(io.BytesIO(Image(gradient())._repr_png_())) as read:
+        assert read.size == (7, 5)
 
 
 @pytest.mark.parametrize("name", ["a.jpg", "a", "png", "a.png.txt"])

@@ -10,6 +10,8 @@ from typing import NoReturn
 
 def main() -> None:
     """The console script and `python -m clrt`."""
+    # NumPy's linear algebra starts a thread a core, which spins through the first 0.1 s; nothing here multiplies large matrices.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     asked = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else the caller had it ignored, as for background jobs
     if asked:
         signal.signal(signal.SIGINT, _leave)

@@ -60,11 +60,15 @@ class Image:
         for row in range(0, self.height, _BLOCK_ROWS):
             block = self.pixels[row : row + _BLOCK_ROWS].astype(np.float64)
             nan = np.isnan(block)
-            bad += int(nan.any(axis=-1).sum())
-            block[nan] = 0.0
+            if nan.any():
+                bad += int(nan.any(axis=-1).sum())
+                block[nan] = 0.0
             np.clip(block, 0.0, 1.0, out=block)
-            encoded = encode_srgb(block) if srgb else block
-            out[row : row + _BLOCK_ROWS] = np.floor(255.0 * encoded + 0.5)
+            if srgb:
+                block = encode_srgb(block)
+            block *= 255.0
+            block += 0.5
+            out[row : row + _BLOCK_ROWS] = block  # cut off: downwards, since nothing is negative
         if bad:
             noun = "pixel is" if bad == 1 else "pixels are"
             warnings.warn(f"{bad} {noun} not a number and shown as black", RuntimeWarning, stacklevel=2)

@@ -7,14 +7,17 @@ the same values; `tests/test_scene_text.py` compares the two, and both with Pyth
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clrt.scene import decimals
 from clrt.scene.grammar import LETTERS
 from clrt.scene.model import FloatArray
+
+_BLOCK = 1 << 18  #: characters at a time, so that what is made of them stays in the cache
 
 _BLANK, _NUMERIC, _OTHER = 0, 1, 2
 
@@ -49,9 +52,20 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class LineTable:
-    """What the bytes of each line say, all (n,): the code of the letter it starts with (0: none), how many fields
-    follow, and whether it is made of blanks and the characters of numbers alone. `fields` is -1 for an empty line."""
+    """What the bytes of each line say.
 
+    text : the bytes, after some line ends; one byte a character
+    starts, ends : (t,) where each field begins, letters included, and the place behind its end
+    first : (n,) the first field of each line
+    letter : (n,) the code of the letter that the line starts with, 0 for none
+    fields : (n,) how many fields follow; -1 for an empty line
+    numeric : (n,) whether the line is made of blanks and the characters of numbers alone
+    """
+
+    text: bytes
+    starts: NDArray[np.int64]
+    ends: NDArray[np.int64]
+    first: NDArray[np.int64]
     letter: NDArray[np.uint8]
     fields: NDArray[np.int64]
     numeric: NDArray[np.bool_]
@@ -59,47 +73,79 @@ class LineTable:
 
 def scan_lines(text: str) -> LineTable:
     """Find letters and count fields in a text with `\\n` line ends, without looking at any line alone."""
-    raw = b"\n" + text.encode("ascii", "replace") + b"\n"
+    raw = b"\n" * decimals.WINDOW + text.encode("ascii", "replace") + b"\n"
     buffer = np.frombuffer(raw, np.uint8)
     classes = np.frombuffer(raw.translate(_CLASSES), np.uint8)
     solid = classes != _BLANK
-    # Fields start where something follows a blank; a line's fields lie between its two line ends.
-    starts = np.flatnonzero(solid[1:] > solid[:-1]) + 1
-    ends = np.flatnonzero(buffer == ord("\n"))
-    first = np.searchsorted(starts, ends[:-1])
-    tokens = np.searchsorted(starts, ends[1:]) - first
+    # Blank and solid take turns, blank first and last; a line's fields lie between its two line ends.
+    turns = np.flatnonzero(solid[1:] != solid[:-1]) + 1
+    starts, ends = turns[0::2], turns[1::2]
+    line_ends = np.flatnonzero(buffer == ord("\n"))[decimals.WINDOW - 1 :]
+    bounds = np.searchsorted(starts, line_ends)
+    first, tokens = bounds[:-1], np.diff(bounds)
 
     letter = np.zeros(len(tokens), np.uint8)
     filled = np.flatnonzero(tokens)
-    head = starts[first[filled]]
-    letter[filled] = np.where(solid[head + 1], 0, buffer[head])
+    head = first[filled]
+    letter[filled] = np.where(ends[head] - starts[head] > 1, 0, buffer[starts[head]])
     numeric = np.ones(len(tokens), np.bool_)
-    numeric[np.searchsorted(ends, np.flatnonzero(classes == _OTHER)) - 1] = False
-    return LineTable(letter, tokens - 1, numeric)
+    numeric[np.searchsorted(line_ends, np.flatnonzero(classes == _OTHER)) - 1] = False
+    return LineTable(raw, starts, ends, first, letter, tokens - 1, numeric)
 
 
 def convert(lines: Sequence[str], fields: int) -> FloatArray | None:
     """The numbers after the letter of each line, (n, fields) float64; None where any is not a decimal number."""
-    if fields == 0:
-        return np.zeros((len(lines), 0))
     try:
         return np.loadtxt(lines, dtype=np.float64, comments=None, usecols=range(1, fields + 1), ndmin=2)
     except ValueError:
         return None
 
 
+def _values(table: LineTable, chosen: NDArray[np.int64], fields: int, lines: Sequence[str]) -> tuple[NDArray[np.int64], FloatArray]:
+    """The lines of `chosen` that could be read, and their numbers, (n, fields) float64.
+
+    Lines of short numbers are read at once, all others by NumPy's reader, or not at all where one of them is at fault.
+    """
+    if fields == 0:
+        return chosen, np.zeros((len(chosen), 0))
+    tokens = (table.first[chosen, None] + np.arange(1, fields + 1)).ravel()
+    read, right = decimals.read_decimals(table.text, table.starts[tokens], table.ends[tokens])
+    values, whole = read.reshape(-1, fields), right.reshape(-1, fields).all(axis=1)
+    others = np.flatnonzero(~whole)
+    if len(others):
+        found = convert([lines[i].replace(",", " ") for i in chosen[others].tolist()], fields)
+        if found is None:
+            return chosen[whole], values[whole]
+        values[others] = found
+    return chosen, values
+
+
 def read_bulk(text: str, lines: Sequence[str]) -> tuple[dict[tuple[str, int], Rows], NDArray[np.int64]]:
     """Convert all plain lines: (letter, fields) -> rows, and the indices of the lines that are left, empty ones aside."""
-    table = scan_lines(text)
-    plain = text.replace(",", " ").split("\n") if "," in text else lines
-    left = table.fields >= 0
-    rows: dict[tuple[str, int], Rows] = {}
+    found: dict[tuple[str, int], list[Rows]] = {}
+    left = []
+    start = before = 0
+    while start <= len(text):
+        end = text.find("\n", start + _BLOCK)
+        block = text[start : end if end >= 0 else None]
+        table = scan_lines(block)
+        remains = table.fields >= 0
+        for form, chosen, values in _block_rows(table, lines[before : before + len(remains)]):
+            found.setdefault(form, []).append(Rows(chosen + before + 1, values))
+            remains[chosen] = False
+        left.append(np.flatnonzero(remains) + before)
+        start, before = start + len(block) + 1, before + len(remains)
+    rows = {
+        form: Rows(np.concatenate([r.lines for r in parts]), np.concatenate([r.values for r in parts])) for form, parts in found.items()
+    }
+    return rows, np.concatenate(left)
+
+
+def _block_rows(table: LineTable, lines: Sequence[str]) -> Iterator[tuple[tuple[str, int], NDArray[np.int64], FloatArray]]:
+    """Each form that occurs, the indices of its lines, and their numbers."""
     for letter, forms in LETTERS.items():
         of_letter = np.flatnonzero((table.letter == ord(letter)) & table.numeric)
-        for fields in forms:
-            chosen = of_letter[table.fields[of_letter] == fields]
-            values = convert([plain[i] for i in chosen.tolist()], fields) if len(chosen) else None
-            if values is not None:
-                rows[letter, fields] = Rows(chosen + 1, values)
-                left[chosen] = False
-    return rows, np.flatnonzero(left)
+        for fields in forms if len(of_letter) else ():
+            chosen, values = _values(table, of_letter[table.fields[of_letter] == fields], fields, lines)
+            if len(chosen):
+                yield (letter, fields), chosen, values
