@@ -22,6 +22,7 @@ class TreeArrays:
     indices : (r,) int32 triangle numbers, local to the object, leaf by leaf
     depth : edges from the root to the deepest leaf (a lone leaf: 0)
     builder : "sah" or "median"
+    built_on : "numpy", or "device" for its kernels
     """
 
     lo: NDArray[np.float64]
@@ -33,6 +34,7 @@ class TreeArrays:
     indices: NDArray[np.int32]
     depth: int
     builder: str
+    built_on: str = "numpy"
 
     @property
     def node_count(self) -> int:

@@ -8,6 +8,7 @@ these bounds themselves, where one child is empty: such a cut is exact and gets 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,22 +18,30 @@ from clrt.kdtree.common import F32, F64, Bools, Ints, Refs, split_positions, sta
 #: Relative shift that settles a bound on a plane: a triangle that ends on it does not reach beyond, one that starts there not below.
 _NUDGE = np.float32(2.0**-20)
 
+#: Bins of a node, at least and at most.
+LEAST_BINS, MOST_BINS = 16, 128
+
 #: Narrower extents are not split: the reciprocal of a bin's width would leave float32.
 _NARROWEST = 2.0**-112
 
 
 @dataclass
-class Level:
-    """The open nodes of one depth and their references, node by node.
+class Cells:
+    """Nodes of one depth. count : (m,) references, at least 1. cell_lo, cell_hi : (3, m), float32 values."""
 
-    node, count : (m,) breadth-first numbers, references (at least 1). cell_lo, cell_hi : (3, m), float32 values.
-    ref : (r,) triangle numbers; lo, hi : (3, r) bounds of their clipped parts, rounded outward.
-    """
-
-    node: Ints
     count: Ints
     cell_lo: F64
     cell_hi: F64
+
+
+@dataclass
+class Level(Cells):
+    """The open nodes of one depth and their references, node by node.
+
+    node : (m,) breadth-first numbers. ref : (r,) triangle numbers; lo, hi : (3, r) bounds of their clipped parts, rounded outward.
+    """
+
+    node: Ints
     ref: Refs
     lo: F32
     hi: F32
@@ -48,27 +57,48 @@ class Splits:
     flats_up: Bools
 
 
-def best_splits(level: Level, traversal_cost: float, empty_bonus: float) -> Splits:
+def best_splits(level: Level, bins: int, traversal_cost: float, empty_bonus: float) -> Splits:
     """Evaluate all candidates of all nodes of a level. `empty_bonus` is the share of a split's cost forgiven if a child is empty."""
-    m = len(level.node)
-    bins = _bin_count(len(level.ref), m)
     starts = starts_of(level.count)
     tight_lo = np.minimum.reduceat(level.lo, starts, axis=1)
     tight_hi = np.maximum.reduceat(level.hi, starts, axis=1)
+    counts = (_counts(level, axis, tight_lo[axis], tight_hi[axis], bins) for axis in range(3))
+    return splits_of_counts(level, tight_lo, tight_hi, counts, traversal_cost, empty_bonus)
+
+
+def splits_of_counts(
+    cells: Cells, tight_lo: F32, tight_hi: F32, counts: Iterable[tuple[Ints, Ints]], traversal_cost: float, empty_bonus: float
+) -> Splits:
+    """The best splits of nodes, given the bounds (3, m) of their references and, for each axis, how many of these begin and end
+    in each bin: (m, bins + 2) each, bin k in column k + 1."""
+    m = len(cells.count)
     best = Splits(np.full(m, np.inf, np.float32), np.zeros(m, np.int64), np.zeros(m, np.float32), np.zeros(m, bool))
-    for axis in range(3):
-        planes = _planes(level, axis, tight_lo[axis], tight_hi[axis], bins)
-        lower, upper = _counts(level, axis, tight_lo[axis], tight_hi[axis], bins)
-        _keep_better(best, level, axis, planes, lower, upper, traversal_cost, empty_bonus)
+    for axis, (begins, ends) in enumerate(counts):
+        planes = _planes(cells, axis, tight_lo[axis], tight_hi[axis], begins.shape[1] - 2)
+        # A running sum up to column k counts the bins below plane k.
+        lower = np.cumsum(begins, axis=1)[:, :-1]
+        upper = cells.count[:, None] - np.cumsum(ends, axis=1)[:, :-1]
+        lower[:, -1], upper[:, -1] = cells.count, 0
+        _keep_better(best, cells, axis, planes, lower, upper, traversal_cost, empty_bonus)
     return best
 
 
-def _bin_count(references: int, nodes: int) -> int:
-    """Bins a node: many while nodes are few, and never more histogram than references."""
-    return int(np.clip(references // nodes, 16, 128))
+def bin_count(triangles: int, depth: int) -> int:
+    """Bins of a node at this depth of a tree over so many triangles: many while nodes are few, at most 4 a triangle in all.
+
+    The whole rule, so that builders that take nodes in any order find the same splits.
+    """
+    return int(min(max(LEAST_BINS, 4 * triangles >> depth), MOST_BINS))
 
 
-def _planes(level: Level, axis: int, lo: F32, hi: F32, bins: int) -> F32:
+def bin_scales(lo: F32, hi: F32, bins: int | Ints) -> tuple[F32, F32]:
+    """Factors from a distance above `lo` to a number of bins, for where references begin and where they end."""
+    extent = hi.astype(np.float64) - lo
+    per_bin = np.where(extent > _NARROWEST, bins / np.maximum(extent, _NARROWEST), 0).astype(np.float32)
+    return per_bin * (1 + _NUDGE), per_bin * (1 - _NUDGE)
+
+
+def _planes(level: Cells, axis: int, lo: F32, hi: F32, bins: int) -> F32:
     """Candidate planes, (m, bins + 1): the first and the last are the bounds of the references; NaN where not inside the cell."""
     step = (hi.astype(np.float64) - lo) / bins
     planes = split_positions(lo[:, None] + step[:, None] * np.arange(bins + 1))
@@ -79,25 +109,20 @@ def _planes(level: Level, axis: int, lo: F32, hi: F32, bins: int) -> F32:
 
 
 def _counts(level: Level, axis: int, lo: F32, hi: F32, bins: int) -> tuple[Ints, Ints]:
-    """How many references reach below and above each plane, (m, bins + 1) each."""
+    """How many references begin and end in each bin, (m, bins + 2) each."""
     m, width = len(level.node), bins + 2
-    extent = hi.astype(np.float64) - lo
-    per_bin = np.where(extent > _NARROWEST, bins / np.maximum(extent, _NARROWEST), 0).astype(np.float32)
-    # Column k + 1 holds bin k, so that a running sum up to column k counts the bins below plane k.
     first = np.repeat(np.arange(1, m * width + 1, width, dtype=np.int32), level.count)
     base = np.repeat(lo, level.count)
-    begin = (level.lo[axis] - base) * np.repeat(per_bin * (1 + _NUDGE), level.count)
-    end = (level.hi[axis] - base) * np.repeat(per_bin * (1 - _NUDGE), level.count)
+    to_begin, to_end = bin_scales(lo, hi, bins)
+    begin = (level.lo[axis] - base) * np.repeat(to_begin, level.count)
+    end = (level.hi[axis] - base) * np.repeat(to_end, level.count)
     begins = np.bincount(begin.astype(np.int32) + first, minlength=m * width).reshape(m, width)
     ends = np.bincount(end.astype(np.int32) + first, minlength=m * width).reshape(m, width)
-    lower = np.cumsum(begins, axis=1)[:, :-1]
-    upper = level.count[:, None] - np.cumsum(ends, axis=1)[:, :-1]
-    lower[:, -1], upper[:, -1] = level.count, 0
-    return lower, upper
+    return begins, ends
 
 
 def _keep_better(
-    best: Splits, level: Level, axis: int, planes: F32, lower: Ints, upper: Ints, traversal_cost: float, empty_bonus: float
+    best: Splits, level: Cells, axis: int, planes: F32, lower: Ints, upper: Ints, traversal_cost: float, empty_bonus: float
 ) -> None:
     """Put the cheapest plane of this axis into `best` where it beats what is there."""
     extent = level.cell_hi - level.cell_lo

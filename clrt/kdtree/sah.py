@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clrt.kdtree.binning import Level, Splits, best_splits
+from clrt.kdtree.binning import Level, Splits, best_splits, bin_count
 from clrt.kdtree.clip import clipped_bounds
 from clrt.kdtree.common import (
     F32,
@@ -48,7 +48,7 @@ def build_sah(
     level = _root(vertices)
     depth, numbered = 0, 1
     while level.node.size:
-        splits = best_splits(level, traversal_cost, empty_bonus)
+        splits = best_splits(level, bin_count(len(vertices), depth), traversal_cost, empty_bonus)
         inner = np.asarray(splits.cost < level.count)
         if depth == max_depth:
             inner[:] = False
@@ -71,7 +71,7 @@ def _root(vertices: F64) -> Level:
     exact_lo, exact_hi = corner_bounds(vertices)
     lo, hi = round_down(exact_lo), round_up(exact_hi)
     cell_lo, cell_hi = (bound[:, None].astype(np.float64) for bound in (lo.min(axis=1), hi.max(axis=1)))
-    return Level(np.zeros(1, np.int64), np.array([n]), cell_lo, cell_hi, np.arange(n, dtype=np.int32), lo, hi)
+    return Level(np.array([n]), cell_lo, cell_hi, np.zeros(1, np.int64), np.arange(n, dtype=np.int32), lo, hi)
 
 
 def _descend(
@@ -90,7 +90,7 @@ def _descend(
     writer.leaves(node[leaf], child_count[leaf], level.ref[order[in_leaf]])
     rest = ~in_leaf
     ref, lo, hi = _gather(level, order[rest], piece[rest], pieces)
-    return Level(node[~leaf], child_count[~leaf], cell_lo[:, ~leaf], cell_hi[:, ~leaf], ref, lo, hi)
+    return Level(child_count[~leaf], cell_lo[:, ~leaf], cell_hi[:, ~leaf], node[~leaf], ref, lo, hi)
 
 
 def _sides(level: Level, splits: Splits, inner: Bools, source: Ints, count: Ints) -> tuple[Bools, Bools]:
