@@ -16,12 +16,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from clrt.device import kernel_cache, layout, program
+from clrt.device.blocks import WideArrays, wide_arrays
 from clrt.device.context import open_device
 from clrt.device.pack import local_origin, pack
 from clrt.device.packed import Packed
 from clrt.device.session import Buffers, StageCounter
 from clrt.features import Features
-from clrt.kdtree import build_tree
+from clrt.forest.choose import build_trees
 from clrt.kdtree.tree import KdTree
 from clrt.precision import rung
 from clrt.ray_arrays import RayArrays
@@ -33,7 +34,7 @@ from clrt.scene.model import Scene
 HIT_DTYPE = layout.HIT_RECORD
 
 _CHUNK = 1 << 18  #: rays a launch: keeps buffers small and lets Ctrl-C in
-_LOCAL = 8  #: packets a work-group
+_LOCAL = 64  #: rays a work-group
 _FINISH_LOCAL = 64
 _LIST_LIMIT = 1 << 20  #: hits listed by a launch, but for a single ray that has more
 _FIRST, _ANY, _COUNT, _LIST = 0, 1, 2, 3  #: modes of the kernel `cast`
@@ -64,15 +65,17 @@ class RayCaster:
         self._device = open_device(device)
         scene, self._scale = at_unit_size(self.scene)
         origin = local_origin(scene)
-        self.trees: tuple[KdTree, ...] = tuple(build_tree(item.vertices - origin, tree) for item in scene.objects)
+        meshes = [item.vertices for item in scene.objects]
+        self.trees: tuple[KdTree, ...] = tuple(build_trees(meshes, np.tile(origin, (len(meshes), 1)), tree, self._device)[0])
         features = Features(())
         self._packed = pack(scene, self.trees, features, self.precision)
-        self._lanes = self.precision.lanes(self._device.info.lanes)
-        shape = program.Shape(program.stack_size(max((t.depth for t in self.trees), default=0)))
-        program.check_limits(self.precision, self._lanes, shape, features)
-        built = program.build(self._device, program.compose(features, self.precision, self._lanes, shape, entry="cast"))
+        width = max(4, self.precision.lanes(self._device.info.lanes))
+        wide = wide_arrays(self._packed, self.trees, width)
+        shape = program.Shape(wide.stack, block=width)
+        built = program.build(self._device, program.compose(features, self.precision, 1, shape, entry="cast"))
         self._buffers = Buffers(self._device, self._packed, features, self.precision)
         self._buffers.prepare(built, planes=False)
+        self._upload_wide(built, wide)
         self._stages: StageCounter | None = None
         self._sources = self._buffers.upload(_sources(self.scene, self._packed))
         self._set_arguments(built)
@@ -168,15 +171,30 @@ class RayCaster:
         self._cast_kernel.set_arg(_HIT_LIST, None)  # later launches must not meet a buffer that is gone
         self._finish(hits, found)
 
+    def _upload_wide(self, built: Any, wide: WideArrays) -> None:
+        """Brings the wide trees to the device, and fills their blocks there."""
+        import pyopencl as cl
+
+        buffers, objects = self._buffers, self._packed.objects.copy()
+        objects["root"] = wide.roots
+        self._objects, self._wide = buffers.upload(objects), buffers.upload(wide.nodes)
+        record = layout.block(self.precision.real, wide.slots.shape[1]).itemsize
+        self._blocks = buffers.empty(max(1, len(wide.slots)) * record)
+        if wide.slots.size:
+            slots, size = buffers.upload(wide.slots), (-(-wide.slots.size // _FINISH_LOCAL) * _FINISH_LOCAL,)
+            kernel = cl.Kernel(built, "prepare_blocks")
+            kernel(self._device.queue, size, (_FINISH_LOCAL,), buffers.triangles, slots, self._blocks, np.int32(wide.slots.size))
+            self._device.queue.finish()
+
     def _set_arguments(self, built: Any) -> None:
         """Sets what is the same for all launches; pyopencl makes a new kernel object at each attribute access of a program."""
         import pyopencl as cl
 
         packed, buffers = self._packed, self._buffers
-        nodes, indices, objects, surfaces, _ = buffers.core
+        surfaces = buffers.core[3]
         self._cast_kernel, self._finish_kernel = cl.Kernel(built, "cast"), cl.Kernel(built, "cast_finish")
         constant = (
-            nodes, indices, buffers.triangles, buffers.vertices, objects, surfaces, np.int32(len(self.trees)), np.int32(packed.slots),
+            self._wide, self._blocks, buffers.triangles, buffers.vertices, self._objects, surfaces, np.int32(len(self.trees)), np.int32(packed.slots),
             np.array([*packed.origin, 0.0]), self.precision.real(packed.objects["extent"].max(initial=0.0)),
         )  # fmt: skip
         for place, value in enumerate(constant):
@@ -224,8 +242,7 @@ class RayCaster:
 
         self._cast_kernel.set_arg(_RAYS, np.int32(count))
         self._cast_kernel.set_arg(_MODE, np.int32(mode))
-        packets = -(-count // self._lanes)
-        cl.enqueue_nd_range_kernel(self._device.queue, self._cast_kernel, (-(-packets // _LOCAL) * _LOCAL,), (_LOCAL,))
+        cl.enqueue_nd_range_kernel(self._device.queue, self._cast_kernel, (-(-count // _LOCAL) * _LOCAL,), (_LOCAL,))
 
     def _results(self, part: slice) -> NDArray[np.int32]:
         import pyopencl as cl

@@ -34,7 +34,7 @@ HOT int ray_scaled(global GivenRay *ray) {
 // which gets (slot, ray) for each, in the order of t and id.
 // The hint keeps a compiler's own vectoriser (Intel's) off lanes that are vectors already: it would take seconds, for slower code.
 kernel __attribute__((vec_type_hint(real_n)))
-void cast(global const int2 *nodes, global const int *indices, global const Triangle *triangles, global const double *vertices,
+void cast(global const WideNode *wide, global const Block *blocks, global const Triangle *triangles, global const double *vertices,
           global const Object *objects, global const Surface *surfaces, int object_count, int slot_count, double4 local_origin,
           real extent, global GivenRay *given, global int *result, global int2 *list, int count, int mode
           //@ parameters
@@ -42,8 +42,10 @@ void cast(global const int2 *nodes, global const int *indices, global const Tria
     const int first = get_global_id(0) * LANES;
     if (first >= count) return;
     Geometry geometry;
-    geometry.nodes = nodes;
-    geometry.indices = indices;
+    geometry.nodes = 0;
+    geometry.indices = 0;
+    geometry.wide = wide;
+    geometry.blocks = blocks;
     geometry.triangles = triangles;
     geometry.planes = 0;
     geometry.vertices = vertices;

@@ -121,3 +121,10 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
 //@hook tree_ordered
     ordered = 1;  // ties are settled triangle by triangle
 //@end
+//@hook block_limits
+    const real after = rays->t_min_high, before = hits->low;
+//@end
+//@hook block_accept
+        hits->t = t[lane] + error[lane];
+        hits->low = t[lane] - error[lane];
+//@end

@@ -109,6 +109,20 @@ def texture(real: type) -> np.dtype[np.void]:
                          ("wrap", np.int32), ("linear", np.int32)])  # fmt: skip
 
 
+def wide_node(real: type, width: int) -> np.dtype[np.void]:
+    """A node of the wide tree (blocks.cl): planes of its children's boxes, by axis first the lower, then the upper ones; which node or block
+    each child is; the children from near to far, four bits an octant.
+    """
+    return struct_dtype([("planes", real, (6, width)), ("child", np.int32, (width,)), ("order", np.int32, (width,))])
+
+
+def block(real: type, width: int) -> np.dtype[np.void]:
+    """Triangles side by side: the members of `triangle`, and the slot of each. 1 KiB for 16 in float32."""
+    vector: Any = (real, (3, width))
+    return struct_dtype([("v0", *vector), ("e1", *vector), ("e2", *vector), ("normal", *vector), ("bound", real, (width,)),
+                         ("normal_bound", real, (width,)), ("slot", np.int32, (width,)), ("unused", np.int32, (width,))])  # fmt: skip
+
+
 _F8_VECTOR: Any = (np.float64, (3,))
 
 #: a ray of a caller's array, in float64; `scale` is the kernel's own

@@ -31,11 +31,11 @@ from clrt.features import REAL, Features
 from clrt.precision import Precision
 
 _RAYS = ("rays.cl", "geometry.cl", "triangle.cl")
-_TREES = ("box.cl", "kdtree.cl")
+_TREES = ("box.cl",)
 #: entry point -> files before effects that the traversal calls, between those and other effects, after all
 _ENTRIES = {
-    "render": (("hit.cl",), ("scene.cl", "surface.cl"), ("camera.cl", "prepare.cl", "render.cl")),
-    "cast": ((), ("scene.cl",), ("after.cl", "prepare.cl", "cast.cl", "cast_finish.cl")),
+    "render": (("kdtree.cl", "hit.cl"), ("scene.cl", "surface.cl"), ("camera.cl", "prepare.cl", "render.cl")),
+    "cast": ((), ("blocks.cl",), ("after.cl", "prepare.cl", "cast.cl", "cast_finish.cl")),
 }
 PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a packet, width and height
 TILE = (16, 8)  #: pixels of a tile, width and height: whole packets of any size
@@ -60,12 +60,14 @@ class Shape:
     depth : greatest number of bounces
     shared_lights : whether edge planes as seen from the lights are at hand
     tree : entries of the stack of the tree over boxes, at least its depth
+    block : of arrays of rays, the triangles that are tested at once
     """
 
     stack: int
     depth: int = 0
     shared_lights: bool = True
     tree: int = 8
+    block: int = 0
 
 
 def bounce_stack(features: Features, depth: int) -> int:
@@ -93,7 +95,7 @@ def kernel_source(name: str) -> tuple[str, tuple[tuple[str, str, int], ...]]:
     return _HOOK.sub("", text).rstrip("\n") + "\n", hooks
 
 
-def _structs(features: Features, precision: Precision, entry: str) -> str:
+def _structs(features: Features, precision: Precision, entry: str, block: int) -> str:
     real = precision.real
     names = [
         ("Triangle", layout.triangle(real)), ("EdgePlanes", layout.edge_planes(real)), ("Object", layout.object_record(real)),
@@ -106,6 +108,7 @@ def _structs(features: Features, precision: Precision, entry: str) -> str:
     )  # fmt: skip
     names += [(name, make(real)) for name, make in optional if f" {name} " in declared]
     if entry == "cast":
+        names += [("WideNode", layout.wide_node(real, block)), ("Block", layout.block(real, block))]
         names += [("GivenRay", layout.GIVEN_RAY), ("HitSource", layout.HIT_SOURCE), ("HitRecord", layout.HIT_RECORD)]
     return "".join(layout.c_struct(name, dtype) for name, dtype in names)
 
@@ -129,6 +132,8 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     width, height = PACKETS[lanes]
     values: dict[str, int] = {"REAL_BITS": precision.bits, "LANES": lanes, "PACKET_WIDTH": width, "PACKET_HEIGHT": height,
                               "STACK_SIZE": shape.stack}  # fmt: skip
+    if shape.block:
+        values["BLOCK"] = shape.block
     names = {f.name for f in features.active}
     if "sampling" in names:
         values |= {"TILE_WIDTH": TILE[0], "TILE_HEIGHT": TILE[1]}
@@ -194,7 +199,7 @@ def compose(features: Features, precision: Precision, lanes: int, shape: Shape, 
         for place, code, line in kernel_source(name)[1]:
             hooks.setdefault(place, []).append((name, code, line))
     chunks = [_defines(features, precision, lanes, shape, counting), f'#line 1 "lanes.cl"\n{kernel_source("lanes.cl")[0]}']
-    chunks.append(f'#line 1 "structs"\n{_structs(features, precision, entry)}')
+    chunks.append(f'#line 1 "structs"\n{_structs(features, precision, entry, shape.block)}')
     for name in files:
         chunks.append(f'#line 1 "{name}"\n' + _insert(name, kernel_source(name)[0], hooks))
     return _COUNTING.sub(r"\1\2\n" if counting else "\n", "".join(chunks))

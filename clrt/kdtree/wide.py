@@ -1,0 +1,144 @@
+"""A kd-tree made wide, for single rays: nodes of many children over blocks of triangles, each tested by one vector.
+
+Subtrees of as many triangles as a block has room for become blocks. Of what lies above, each node takes in as many descendants as it has
+room for, the largest box first (Wald, Benthin and Boulos, 2008). The planes of the kd-tree order the children from near to far by octant of
+the ray's direction. Boxes are those of whole triangles, so they may overlap; none is missed for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.kdtree.parted import FloatArray, Ints, PartedTree, part
+from clrt.kdtree.tree import KdTree
+
+
+@dataclass(frozen=True, eq=False)
+class WideTree:
+    """lo, hi : (nodes, width, 3) float64 boxes of the children; lo > hi where there is none
+    child : (nodes, width) another node, or -1 - a block; -1 where there is none: block 0 is empty
+    order : (nodes, width, 8) children from near to far, by octant
+    blocks : (blocks, width) triangles, -1 where there is none
+    depth : levels of nodes
+    """
+
+    lo: FloatArray
+    hi: FloatArray
+    child: Ints
+    order: Ints
+    blocks: Ints
+    depth: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Boxed:
+    """A parted tree with the box (m, 3) of each node down to the blocks, and the block of each node that is one, else 0 (m,)."""
+
+    tree: PartedTree
+    lo: FloatArray
+    hi: FloatArray
+    block: Ints
+
+
+def widen(tree: KdTree, lo: FloatArray, hi: FloatArray, width: int) -> WideTree:
+    """The wide tree over triangles with the boxes lo, hi (n, 3), in the coordinates of the kd-tree; node 0 is the root."""
+    if not len(lo):
+        return _empty(width)
+    parted, order = part(tree, lo / 2.0 + hi / 2.0, width)
+    places = parted.positions()
+    tops = _tops(parted, places[:, 0], width)
+    boxed = _boxed(parted, tops, lo[order], hi[order])
+    nodes, child, depth = _collapsed(boxed, width)
+    there = nodes >= 0
+    blocks = np.full((len(tops) + 1, width), -1)
+    filled = np.arange(width) < parted.count[tops, None]
+    blocks[1:][filled] = order  # blocks have the triangles in order, and all of them
+    return WideTree(
+        lo=np.where(there[..., None], boxed.lo[nodes], np.inf),
+        hi=np.where(there[..., None], boxed.hi[nodes], -np.inf),
+        child=child,
+        order=np.argsort(np.where(there[..., None], places[nodes], len(lo)), axis=1, kind="stable"),
+        blocks=blocks,
+        depth=depth,
+    )
+
+
+def _empty(width: int) -> WideTree:
+    none = np.full((1, width, 3), np.inf)
+    return WideTree(none, -none, np.full((1, width), -1), np.zeros((1, width, 8), np.int64), np.full((1, width), -1), 1)
+
+
+def _tops(parted: PartedTree, first: Ints, width: int) -> Ints:
+    """The nodes that become blocks, in the order of their triangles: the topmost ones with at most `width`."""
+    small = parted.count <= width
+    below = np.zeros(len(small), bool)
+    for level in parted.levels:
+        lower = parted.child[level]
+        below[lower] = below[lower + 1] = small[level]
+    tops = np.flatnonzero(small & ~below & (parted.count > 0))
+    return tops[np.argsort(first[tops])]
+
+
+def _boxed(parted: PartedTree, tops: Ints, lo: FloatArray, hi: FloatArray) -> _Boxed:
+    """lo, hi : (n, 3) boxes of the triangles in order."""
+    nodes = len(parted.count)
+    starts = np.cumsum(parted.count[tops]) - parted.count[tops]
+    box_lo, box_hi, block = np.full((nodes, 3), np.inf), np.full((nodes, 3), -np.inf), np.zeros(nodes, np.int64)
+    if len(tops):
+        box_lo[tops], box_hi[tops] = np.minimum.reduceat(lo, starts), np.maximum.reduceat(hi, starts)
+    block[tops] = np.arange(1, len(tops) + 1)
+    for level in reversed(parted.levels):
+        level = level[block[level] == 0]
+        lower = parted.child[level]
+        box_lo[level] = np.minimum(box_lo[lower], box_lo[lower + 1])
+        box_hi[level] = np.maximum(box_hi[lower], box_hi[lower + 1])
+    return _Boxed(parted, box_lo, box_hi, block)
+
+
+def _collapsed(boxed: _Boxed, width: int) -> tuple[Ints, Ints, int]:
+    """(nodes, width): which node of the tree below each child is, -1 for none; the numbers of children as WideTree has them; the depth."""
+    roots, rows, children, depth = _contracted(boxed, np.zeros(1, np.int64)), [], [], 0
+    done = 0
+    while len(roots):
+        taken = _descendants(boxed, roots, width)
+        done, depth = done + len(roots), depth + 1
+        inner = (taken >= 0) & (boxed.block[taken] == 0)
+        numbers = np.where(taken >= 0, -1 - boxed.block[taken], -1)
+        numbers[inner] = done + np.arange(np.count_nonzero(inner))
+        rows.append(taken)
+        children.append(numbers)
+        roots = taken[inner]
+    return np.concatenate(rows), np.concatenate(children), depth
+
+
+def _contracted(boxed: _Boxed, nodes: Ints) -> Ints:
+    """Each node, or the one below it that has all of its triangles."""
+    tree, nodes = boxed.tree, nodes.copy()
+    while True:
+        lower = tree.child[nodes]
+        inner = np.flatnonzero((boxed.block[nodes] == 0) & (tree.count[nodes] > 0))
+        alone = inner[(tree.count[lower[inner]] == 0) | (tree.count[lower[inner] + 1] == 0)]
+        if not len(alone):
+            return nodes
+        nodes[alone] = lower[alone] + (tree.count[lower[alone]] == 0)
+
+
+def _descendants(boxed: _Boxed, roots: Ints, width: int) -> Ints:
+    """(k, width) of k nodes the descendants that become their children, -1 where there are fewer."""
+    taken = np.full((len(roots), width), -1)
+    taken[:, 0] = roots
+    row = np.arange(len(roots))
+    for ways in range(1, width):
+        nodes = taken[row, :ways]
+        size = boxed.hi[nodes] - boxed.lo[nodes]
+        area = size[..., 0] * size[..., 1] + size[..., 1] * size[..., 2] + size[..., 2] * size[..., 0]
+        area[boxed.block[nodes] > 0] = -1.0
+        largest = area.argmax(axis=1)
+        opened = area[np.arange(len(row)), largest] >= 0.0
+        row, largest = row[opened], largest[opened]
+        lower = boxed.tree.child[taken[row, largest]]
+        taken[row, largest], taken[row, ways] = _contracted(boxed, lower), _contracted(boxed, lower + 1)
+    return taken

@@ -1,0 +1,213 @@
+// Provides: scene_trace: one ray through the wide trees of all objects, for the closest or for any hit; kernel prepare_blocks.
+// Needs: lanes.cl (LANES 1), rays.cl, structs, geometry.cl, one triangle_*.cl.  Reads: BLOCK (16, 8 or 4), STACK_SIZE.
+//
+// A vector holds one number of all children of a node, or of all triangles of a block. What it keeps of a block goes one by one through
+// triangle_test, which decides: what is left out here is what that would refuse.
+
+typedef PASTE(REAL_NAME, BLOCK) block_n;
+typedef PASTE(LANE_INT_NAME, BLOCK) block_mask;
+typedef PASTE(int, BLOCK) block_int;
+// Rows of records are aligned to their size; a vload of PoCL does not know, and takes several loads.
+#define load_block(p) (*(global const block_n *)(p))
+
+#if BLOCK == 16 && REAL_BITS == 32 && defined(__AVX512DQ__) && defined(__clang__)
+#define block_bits(m) ((uint)__builtin_ia32_cvtd2mask512(m))
+#elif BLOCK == 8 && REAL_BITS == 64 && defined(__AVX512DQ__) && defined(__clang__)
+#define block_bits(m) ((uint)__builtin_ia32_cvtq2mask512(m))
+#elif BLOCK == 8 && REAL_BITS == 32 && defined(__AVX__) && defined(__clang__)
+#define block_bits(m) ((uint)__builtin_ia32_movmskps256(as_float8(m)))
+#elif BLOCK == 4 && REAL_BITS == 64 && defined(__AVX__) && defined(__clang__)
+#define block_bits(m) ((uint)__builtin_ia32_movmskpd256(as_double4(m)))
+#else
+HOT uint block_bits(block_mask m) {
+    lane_int lane[BLOCK];
+    uint bits = 0;
+    PASTE(vstore, BLOCK)(m, 0, lane);
+    for (int k = 0; k < BLOCK; k++) bits |= (uint)(lane[k] & 1) << k;
+    return bits;
+}
+#endif
+
+#ifdef __clang__
+#define lowest_bit(bits) __builtin_ctz(bits)
+#else
+#define lowest_bit(bits) (31 - (int)clz((bits) & -(bits)))
+#endif
+
+// New bounds come first: where one is NaN (beyond the range of `real`), the old one stays.
+HOT block_n min_block(block_n a, block_n b) { return (a < b) ? a : b; }
+HOT block_n max_block(block_n a, block_n b) { return (a > b) ? a : b; }
+HOT block_n abs_block(block_n a) { return (a < (real)0) ? -a : a; }
+
+// The ray's numbers that are the same for all nodes of an object.
+// With `pad` = 8u reach, all errors of (plane - origin) * inverse that box.cl lists are below pad |inverse|, as no plane is further than
+// `reach`: so the shifts, which take the origin away and the pad away or to it, leave a multiplication and an addition a plane.
+typedef struct {
+    real inverse[3], enter_shift[3], leave_shift[3];
+    int enter[3];     // of the six rows of planes, the one that the ray enters by; it leaves by the other of the axis
+    int order_shift;  // of the ray's octant, in `order`
+} WideRay;
+
+// Children of a node that the ray may meet before t_max, a bit each, with their distances; all in order from near to far.
+HOT uint node_children(global const WideNode *node, const WideRay *ray, real t_min, real t_max, block_n *distance, block_int *child) {
+#pragma OPENCL FP_CONTRACT ON
+#define row(n) load_block(node->planes[n])
+    block_n enter = max_block(row(ray->enter[0]) * ray->inverse[0] + ray->enter_shift[0], (block_n)t_min);
+    block_n leave = min_block(row(ray->enter[0] ^ 1) * ray->inverse[0] + ray->leave_shift[0], (block_n)t_max);
+    enter = max_block(row(ray->enter[1]) * ray->inverse[1] + ray->enter_shift[1], enter);
+    leave = min_block(row(ray->enter[1] ^ 1) * ray->inverse[1] + ray->leave_shift[1], leave);
+    enter = max_block(row(ray->enter[2]) * ray->inverse[2] + ray->enter_shift[2], enter);
+    leave = min_block(row(ray->enter[2] ^ 1) * ray->inverse[2] + ray->leave_shift[2], leave);
+#undef row
+    const block_int order = *(global const block_int *)node->order >> ray->order_shift, children = *(global const block_int *)node->child;
+#if BLOCK == 16 && REAL_BITS == 32 && defined(__AVX512DQ__) && defined(__clang__)
+    *child = __builtin_ia32_permvarsi512(children, order);
+    *distance = __builtin_ia32_permvarsf512(enter, order);
+    return block_bits(~(*distance > __builtin_ia32_permvarsf512(leave, order)));
+#else
+    real entered[BLOCK], ordered[BLOCK];
+    int place[BLOCK], number[BLOCK];
+    PASTE(vstore, BLOCK)(enter, 0, entered);
+    PASTE(vstore, BLOCK)(order, 0, place);
+    const uint bits = block_bits(~(enter > leave));
+    uint found = 0;
+    for (int k = 0; k < BLOCK; k++) {
+        const int from = place[k] & (BLOCK - 1);
+        ordered[k] = entered[from];
+        number[k] = node->child[from];
+        found |= ((bits >> from) & 1) << k;
+    }
+    *distance = PASTE(vload, BLOCK)(0, ordered);
+    *child = PASTE(vload, BLOCK)(0, number);
+    return found;
+#endif
+}
+
+// The triangles of a block that triangle_test may accept, by its formulae (triangle.cl) term by term: all of them but those, and those that it
+// accepts for sure, as neither the edges nor the distances are near their errors.
+typedef struct {
+    uint possible, sure;
+    block_n t, error;
+} BlockHits;
+
+HOT void block_test(global const Block *block, const Rays *rays, real reach, const Hits *hits, BlockHits *found) {
+#pragma OPENCL FP_CONTRACT ON
+    const real *d = rays->direction;
+    const block_n e10 = load_block(block->e1[0]), e11 = load_block(block->e1[1]), e12 = load_block(block->e1[2]);
+    const block_n e20 = load_block(block->e2[0]), e21 = load_block(block->e2[1]), e22 = load_block(block->e2[2]);
+    const block_n t0 = rays->origin[0] - load_block(block->v0[0]);
+    const block_n t1 = rays->origin[1] - load_block(block->v0[1]);
+    const block_n t2 = rays->origin[2] - load_block(block->v0[2]);
+    const block_n p0 = d[1] * e22 - d[2] * e21, p1 = d[2] * e20 - d[0] * e22, p2 = d[0] * e21 - d[1] * e20;
+    const block_n q0 = t1 * e12 - t2 * e11, q1 = t2 * e10 - t0 * e12, q2 = t0 * e11 - t1 * e10;
+    const block_n u = t0 * p0 + t1 * p1 + t2 * p2;
+    const block_n v = d[0] * q0 + d[1] * q1 + d[2] * q2;
+    const block_n w = (p0 * e10 + p1 * e11 + p2 * e12) - u - v;
+    const block_n bound = reach * load_block(block->bound), lowest = min_block(min_block(u, v), w), highest = max_block(max_block(u, v), w);
+    found->possible = block_bits((lowest >= -bound) | (highest <= bound));
+    if (!found->possible) return;
+    const block_n n0 = load_block(block->normal[0]), n1 = load_block(block->normal[1]), n2 = load_block(block->normal[2]);
+    const block_n normal_bound = load_block(block->normal_bound);
+    const block_n rate = d[0] * n0 + d[1] * n1 + d[2] * n2, offset = -t0 * n0 + -t1 * n1 + -t2 * n2;
+    const block_n inverse = R(1.0) / rate;
+    const block_n t = offset * inverse;
+    const block_n error = (abs_block(t) * normal_bound + reach * normal_bound) * abs_block(R(2.0) * inverse);
+    const block_mask grazing = abs_block(rate) <= R(2.0) * normal_bound;
+    const block_mask outside = (t + error < rays->t_min) | (t - error > hits->t);
+    found->possible &= block_bits(grazing | ~outside);
+    const block_mask clear = ((lowest > bound) & (highest > R(8.0) * bound)) | ((highest < -bound) & (lowest < R(-8.0) * bound));
+    //@ block_limits
+    found->sure = found->possible & block_bits(clear & ~grazing & (t - error > after) & (t + error < before));
+    found->t = t;
+    found->error = error;
+}
+
+HOT void block_hits(const Geometry *geometry, global const Block *block, const Rays *rays, real reach, Hits *hits) {
+    BlockHits found;
+    block_test(block, rays, reach, hits, &found);
+    if (!found.possible) return;
+    if (found.sure == found.possible && !(found.sure & (found.sure - 1)) && rays->after < 0) {
+        const int lane = lowest_bit(found.sure);
+        real t[BLOCK], error[BLOCK];
+        PASTE(vstore, BLOCK)(found.t, 0, t);
+        PASTE(vstore, BLOCK)(found.error, 0, error);
+        hits->slot = block->slot[lane];
+        //@ block_accept
+        return;
+    }
+    for (uint bits = found.possible; bits; bits &= bits - 1)
+        triangle_test(geometry, rays, reach, block->slot[lowest_bit(bits)], 0, ALL_LANES, hits);
+}
+
+HOT void blocks_trace(const Geometry *geometry, global const Object *object, const Rays *rays, const int any_hit, Hits *hits) {
+    const real reach = rays_reach(rays, object), pad = (R(8.0) * UNIT_ROUNDOFF) * reach;
+    WideRay ray;
+    ray.order_shift = 4 * (int)rays->octant;
+#define axis(a)                                                             \
+    ray.inverse[a] = rays->inverse[a];                                      \
+    ray.enter_shift[a] = -(rays->origin[a] * rays->inverse[a]) - pad * abs_n(rays->inverse[a]); \
+    ray.leave_shift[a] = -(rays->origin[a] * rays->inverse[a]) + pad * abs_n(rays->inverse[a]); \
+    ray.enter[a] = 2 * a + (((int)rays->octant >> a) & 1);
+    axis(0) axis(1) axis(2)
+#undef axis
+    // Nodes with children left to see: which, and their distances.
+    block_n distances[STACK_SIZE];
+    block_int children[STACK_SIZE];
+    uint pending[STACK_SIZE];
+    int level = 0, node = object->root;
+    for (;;) {
+        if (node >= 0) {
+            pending[level] = node_children(geometry->wide + node, &ray, rays->t_min, hits->t, distances + level, children + level);
+            level += pending[level] != 0;
+        } else {
+            block_hits(geometry, geometry->blocks + (-1 - node), rays, reach, hits);
+            if (any_hit && hits->slot >= 0) return;
+        }
+        real distance;
+        do {
+            if (level == 0) return;
+            const uint bits = pending[level - 1];
+            const int next = lowest_bit(bits);
+            node = ((const int *)(children + level - 1))[next];
+            distance = ((const real *)(distances + level - 1))[next];
+            pending[level - 1] = bits & (bits - 1);
+            level -= (bits & (bits - 1)) == 0;
+        } while (distance > hits->t);
+    }
+}
+
+HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int shared_origin, const int any_hit, Hits *hits) {
+    for (int b = 0; b < geometry->object_count; b++) {
+        blocks_trace(geometry, geometry->objects + b, rays, any_hit, hits);
+        if (any_hit && hits->slot >= 0) return;
+    }
+}
+
+// One number of each block's records from those of its triangles; NaN corners, which no test accepts, where there is none.
+kernel void prepare_blocks(global const Triangle *triangles, global const int *slots, global Block *blocks, int count) {
+    const int i = get_global_id(0), lane = i % BLOCK;
+    if (i >= count) return;
+    global Block *block = blocks + i / BLOCK;
+    const int slot = slots[i];
+    global const Triangle *triangle = triangles + (slot < 0 ? 0 : slot);
+    for (int a = 0; a < 3; a++) {
+        block->v0[a][lane] = slot < 0 ? (real)NAN : triangle->v0[a];
+        block->e1[a][lane] = triangle->e1[a];
+        block->e2[a][lane] = triangle->e2[a];
+        block->normal[a][lane] = triangle->normal[a];
+    }
+    block->bound[lane] = triangle->bound;
+    block->normal_bound[lane] = triangle->normal_bound;
+    block->slot[lane] = slot;
+}
+
+//@hook geometry_members
+    global const WideNode *wide;
+    global const Block *blocks;
+//@end
+//@hook block_limits_default
+    const real after = rays->t_min, before = hits->t;
+//@end
+//@hook block_accept_default
+        hits->t = t[lane];
+//@end
