@@ -20,8 +20,8 @@ from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
 from clrt.features.choice import effect_names, not_called_for
 from clrt.files import atomic_write
+from clrt.forest import choose as forest
 from clrt.image.image import Image
-from clrt.kdtree import build_tree
 from clrt.kdtree.boxtree import depth_limit
 from clrt.kdtree.tree import KdTree
 from clrt.precision import DEFAULT, Precision, rung
@@ -91,7 +91,7 @@ def render(
     if request:
         accuracy.check_sampled(features)
         request.goal(scene.samples)
-    prepared = build_trees(scene, tree, tell)
+    prepared = build_trees(scene, tree, tell, opened)
     build_end = time.perf_counter()
     buffers, tracer, source, upload_s = open_tracer(prepared, features, ladder, opened, tell)
     compile_s = time.perf_counter() - build_end - upload_s
@@ -163,22 +163,11 @@ def _with_sampling(scene: Scene, samples: int | None, seed: int) -> Scene:
     return replace(scene, samples=samples, seed=seed)
 
 
-def build_trees(scene: Scene, tree: str, tell: Progress) -> Prepared:
-    """A kd-tree an object, over coordinates relative to the object's origin."""
-    trees, seconds = [], []
-    total, done = max(1, scene.triangle_count), 0
-    for item, origin in zip(scene.objects, tree_origins(scene), strict=True):
-        tell("trees", done / total)
-        share = len(item) / total
-        start = time.perf_counter()
-        trees.append(build_tree(item.vertices - origin, tree, progress=partial(_tell_share, tell, done / total, share)))
-        seconds.append(time.perf_counter() - start)
-        done += len(item)
+def build_trees(scene: Scene, tree: str, tell: Progress, device: Device | None = None) -> Prepared:
+    """A kd-tree an object, over coordinates relative to the object's origin; by the device, where one is given and sooner."""
+    meshes = [item.vertices for item in scene.objects]
+    trees, seconds = forest.build_trees(meshes, tree_origins(scene), tree, device, partial(tell, "trees"))
     return Prepared(scene, tuple(trees), tuple(seconds))
-
-
-def _tell_share(tell: Progress, done: float, share: float, fraction: float) -> None:
-    tell("trees", done + share * fraction)
 
 
 def program_shape(prepared: Prepared, features: Features, shared_lights: bool) -> program.Shape:
@@ -250,7 +239,7 @@ def _object_stats(prepared: Prepared) -> list[ObjectStats]:
     return [
         ObjectStats(
             name=item.name, triangles=len(item), nodes=tree.node_count, leaves=tree.leaf_count,
-            references=tree.reference_count, depth=tree.depth, build_s=seconds,
+            references=tree.reference_count, depth=tree.depth, build_s=seconds, built_on=tree.built_on,
         )
         for item, tree, seconds in zip(prepared.scene.objects, prepared.trees, prepared.tree_s, strict=True)
     ]  # fmt: skip

@@ -26,6 +26,7 @@ class ObjectStats:
     depth : edges from the root to the deepest leaf
     build_s : seconds of this tree alone
     tests_per_ray : ray-triangle tests against this object, over all rays of the scene; None unless counted
+    built_on : what built the tree: "numpy", or "device" for its kernels
     """
 
     name: str
@@ -36,6 +37,7 @@ class ObjectStats:
     depth: int
     build_s: float
     tests_per_ray: float | None = None
+    built_on: str = "numpy"
 
 
 @dataclass
@@ -188,4 +190,5 @@ def _object_json(o: ObjectStats) -> dict[str, Any]:
         "depth": o.depth,
         "build_s": round(o.build_s, 6),
         "tests_per_ray": o.tests_per_ray,
+        "built_on": o.built_on,
     }

@@ -31,7 +31,7 @@ static inline void build_bin_scales(float lo, float hi, int bins, float *scales)
 }
 
 // Puts the cheapest plane of one axis into `best` where it beats what is there. lo, hi: bounds of the references along the axis.
-static void build_best_of_axis(const int *begins, const int *ends, int count, int bins, int axis, float lo, float hi,
+static __attribute__((noinline)) void build_best_of_axis(const int *begins, const int *ends, int count, int bins, int axis, float lo, float hi,
                                const float *cell_lo, const float *cell_hi, Split *best) {
     double extent[3];
     for (int a = 0; a < 3; a++) extent[a] = (double)cell_hi[a] - (double)cell_lo[a];

@@ -19,7 +19,9 @@ from pathlib import Path
 
 VARIABLE = "POCL_CACHE_DIR"
 _MARK = "clrt-loading-"
-_POCLS = re.compile(r"[A-P]{2}|tempfile_\w+")  #: entries of PoCL; POCL_CACHE_DIR may name a folder with files of the user's
+_COMPILED = "clrt-compiled-"
+#: entries of PoCL, and notes of them; POCL_CACHE_DIR may name a folder with files of the user's
+_POCLS = re.compile(rf"[A-P]{{2}}|tempfile_\w+|{_COMPILED}\w+")
 
 
 def choose_folder() -> Path:
@@ -94,6 +96,11 @@ def clear_if_one_died() -> bool:
     for mark in dead:
         mark.unlink(missing_ok=True)
     return True
+
+
+def compiled_note(name: str) -> Path:
+    """The file that notes that the program of this name is compiled, kernels and all; it goes when the cache is emptied."""
+    return Path(os.environ.get(VARIABLE, tempfile.gettempdir())) / f"{_COMPILED}{name}"
 
 
 def suspect() -> None:

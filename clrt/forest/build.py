@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from clrt.errors import DeviceError
 from clrt.forest.layout import trees_of
 from clrt.forest.machine import Machine
 from clrt.forest.pool import Pool
@@ -17,8 +18,17 @@ def build_forest(machine: Machine, vertices: F64, counts: Ints, limits: Ints, pr
     """A tree over each of `counts` consecutive triangles, none over none.
 
     vertices : (n, 3, 3), contiguous, finite; not changed. limits : no leaf of a tree is deeper.
-    Raises LimitError where the device has too little memory, DeviceError.
+    Raises LimitError where the device has too little memory, DeviceError for what else it cannot do.
     """
+    import pyopencl as cl
+
+    try:
+        return _build(machine, vertices, counts, limits, progress)
+    except cl.Error as error:
+        raise DeviceError(f"building kd-trees on the device '{machine.device.info.name}' failed: {error}") from error
+
+
+def _build(machine: Machine, vertices: F64, counts: Ints, limits: Ints, progress: Progress | None) -> list[KdTree]:
     ticker = Ticker(len(vertices), progress)
     shared = machine.share(vertices)
     pool = Pool(machine, shared, min(len(vertices) + len(vertices) // 2, _POOL), ticker)

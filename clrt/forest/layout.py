@@ -17,10 +17,10 @@ from clrt.kdtree.tree import KdTree
 
 def trees_of(jobs: Jobs, subtrees: Subtrees, inner: Sequence[Inner], counts: Ints, lo: F64, hi: F64) -> list[KdTree]:
     """The trees over `counts` consecutive triangles each; lo, hi : (trees, 3)."""
-    nodes, of_tree, entries = _preorder(jobs, subtrees, inner)
-    depth, axis = nodes[:, 0] >> 2, (nodes[:, 0] & 3).astype(np.uint8)
+    words, of_tree, entries = _preorder(jobs, subtrees, inner)
+    depth, axis = words[:, 0] >> 2, (words[:, 0] & 3).astype(np.uint8)
     leaf = axis == LEAF
-    size = np.where(leaf, nodes[:, 1], 0)
+    size = np.where(leaf, words[:, 1], 0)
     node_counts = np.bincount(of_tree, minlength=len(counts))
     entry_counts = np.bincount(of_tree, size, minlength=len(counts)).astype(np.int64)
     first_entry = np.cumsum(size, dtype=np.int64) - size - starts_of(entry_counts)[of_tree]
@@ -29,7 +29,7 @@ def trees_of(jobs: Jobs, subtrees: Subtrees, inner: Sequence[Inner], counts: Int
     # The k-th inner node of a tree has children 1 + 2 k and 2 + 2 k.
     rank = np.cumsum(~leaf) - ~leaf
     child = np.where(leaf, first_entry[order], 1 + 2 * (rank - rank[starts_of(node_counts)][of_tree])).astype(np.int32)
-    position = np.where(leaf, 0, nodes[order, 1]).astype(np.int32).view(np.float32)
+    position = np.where(leaf, 0, words[order, 1]).astype(np.int32).view(np.float32)
     axis, size = axis[order], size[order].astype(np.int32)
     deepest = np.maximum.reduceat(depth, starts_of(node_counts))
     ends, entry_ends, triangles = np.cumsum(node_counts), np.cumsum(entry_counts), starts_of(counts)
@@ -37,8 +37,8 @@ def trees_of(jobs: Jobs, subtrees: Subtrees, inner: Sequence[Inner], counts: Int
     for t, (end, entry_end) in enumerate(zip(ends.tolist(), entry_ends.tolist(), strict=True)):
         own, named = slice(end - int(node_counts[t]), end), slice(entry_end - int(entry_counts[t]), entry_end)
         indices = entries[named] - np.int32(triangles[t])
-        arrays = (array[own].copy() for array in (axis, position, child, size))
-        trees.append(KdTree(lo[t], hi[t], *arrays, indices, int(deepest[t]), "sah", "device"))
+        nodes = axis[own].copy(), position[own].copy(), child[own].copy(), size[own].copy()
+        trees.append(KdTree(lo[t], hi[t], *nodes, indices, int(deepest[t]), "sah", "device"))
     return trees
 
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -32,8 +36,36 @@ def source() -> str:
     return defines + "".join(f'#line 1 "{name}"\n{program.kernel_source(name)[0]}' for name in FILES)
 
 
+def compiled_before(device: Device) -> bool:
+    """Whether PoCL has all kernels for this device in its cache, by the note that was left when they were launched."""
+    return _note(device).exists()
+
+
+def is_processor(device: Device) -> bool:
+    """Whether it is a CPU, whose work-items are fast alone."""
+    import pyopencl as cl
+
+    return bool(device.handle.type & cl.device_type.CPU)
+
+
+def _note(device: Device) -> Path:
+    info = device.info
+    text = "\0".join((source(), info.name, info.platform, info.version, info.driver))
+    return kernel_cache.compiled_note(hashlib.sha256(text.encode()).hexdigest()[:16])
+
+
+@lru_cache(maxsize=1)
+def _machine(device: Device) -> Machine:
+    return Machine(device)
+
+
 class Machine:
     """A device with the program built. Raises DeviceError where it cannot be."""
+
+    @staticmethod
+    def of(device: Device) -> Machine:
+        """The one of this device, kept for the next trees."""
+        return _machine(device)
 
     def __init__(self, device: Device) -> None:
         import pyopencl as cl
@@ -82,6 +114,9 @@ class Machine:
             self._kernels[name](self.device.queue, (size,), _LOCAL, *values)
             self.device.queue.finish()
         self._launched.add(name)
+        if len(self._launched) == len(_KERNELS):
+            with suppress(OSError):
+                _note(self.device).touch()
 
 
 class Store:

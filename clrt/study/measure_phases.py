@@ -46,7 +46,7 @@ def _whole_run(subject: Subject, path: Path, taken: dict[str, list[float]]) -> N
         return result
 
     clocked("read", subject.read)
-    prepared: Prepared = clocked("trees", partial(build_trees, subject.scene, "sah", silent))
+    prepared: Prepared = clocked("trees", partial(build_trees, subject.scene, "sah", silent, subject.device))
     shot: Shot = subject.shot_of(prepared)
     taken.setdefault("upload", []).append(shot.upload_s)
     clocked("trace", shot.run)

@@ -42,7 +42,7 @@ def measure(subject: Subject) -> dict[str, Any]:
 
 
 def _build(subject: Subject, name: str, built: dict[str, Prepared]) -> None:
-    built[name] = build_trees(subject.scene, name, silent)
+    built[name] = build_trees(subject.scene, name, silent, subject.device)
 
 
 def _row(subject: Subject, name: str, prepared: Prepared, build: Series, trace: Series) -> dict[str, Any]:
@@ -57,6 +57,6 @@ def _row(subject: Subject, name: str, prepared: Prepared, build: Series, trace: 
     row: dict[str, Any] = {
         "tree": name, "build": measured(build.seconds, "s"), "nodes": counted(sum(t.node_count for t in prepared.trees), "nodes"),
         "depth": counted(max(t.depth for t in prepared.trees), "edges"), "tests_per_ray": tests,
-        "trace": measured(trace.seconds, "s"),
+        "trace": measured(trace.seconds, "s"), "built_on": " and ".join(sorted({t.built_on for t in prepared.trees})),
     }  # fmt: skip
     return {**row, "note": note} if note else row

@@ -122,4 +122,4 @@ def open_subject(
     if scene.samples > plan.samples:
         scene = replace(scene, samples=plan.samples)
     check_picture(device, scene.camera.width, scene.camera.height)
-    return Subject(path, read, build_trees(scene, "sah", silent), device, plan, folder, tell)
+    return Subject(path, read, build_trees(scene, "sah", silent, device), device, plan, folder, tell)
