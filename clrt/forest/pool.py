@@ -62,7 +62,8 @@ class Pool:
 
     def add(self, jobs: Jobs) -> None:
         """Jobs whose references lie in the pool from `used` on, or will once the device has come to it."""
-        self._waiting.append(jobs)
+        if len(jobs.count):
+            self._waiting.append(jobs)
         self.used += int(jobs.count.sum())
 
     def flush(self) -> None:

@@ -12,6 +12,7 @@ from clrt.forest.machine import Machine, Store
 from clrt.kdtree.common import F32, Ints
 
 _ROOM = 6  #: memory of a work-item, as a multiple of the references of its largest job: about twice what meshes need
+_SPARE = 1024  #: references, nodes and entries more than that
 _WORDS = 10  #: of memory a reference: seven rows of the stack, two words of a node, one entry
 _DONE_WORDS = 4  #: of a job's report: first node, nodes, first entry, entries
 _TOO_SMALL = -1  #: in place of a number of nodes: the work-item's memory was too small; -2: the output was
@@ -65,8 +66,8 @@ class SubtreeBuilder:
         """
         counts = table[:, 1].astype(np.int64)
         at_once = table[:, 2] == table[:, 3]  # becomes a leaf, which needs no more room than its references
-        size = int(max(_ROOM * counts[~at_once].max(initial=0), counts.max())) + 1024
-        room = np.array([int(counts.sum()) + 1024 + 4 * len(table), 3 * int(counts.sum()) + 1024])
+        size = int(max(_ROOM * counts[~at_once].max(initial=0), counts.max())) + _SPARE
+        room = np.array([1, 3]) * int(counts.sum()) + _SPARE + 4 * len(table)
         done = np.zeros((len(table), _DONE_WORDS), np.int64)
         all_nodes: list[Words] = []
         all_entries: list[Words] = []
