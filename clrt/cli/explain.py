@@ -76,7 +76,8 @@ def _explain(
     scene = load_scene(path, right_handed=right_handed, split_objects=split_objects, allow_paths=allow_path)
     for warning in scene.warnings:
         failure.warn(f"{scene.source}: {warning}")
-    prepared, opened = build_trees(with_options(scene, size, depth, samples, seed), tree, progress), open_device(device)
+    opened = open_device(device)
+    prepared = build_trees(with_options(scene, size, depth, samples, seed), tree, progress, opened)
     found = explain(prepared, ladder, opened, progress)
     return measure(found, prepared, ladder, opened, rounds, progress) if measured else found
 

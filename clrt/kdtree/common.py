@@ -46,8 +46,9 @@ def checked_vertices(vertices: ArrayLike) -> F64:
         return corners.reshape(0, 3, 3)
     if corners.ndim != 3 or corners.shape[1:] != (3, 3):
         raise MeshError(f"triangles must have shape (n, 3, 3): triangle, corner, x y z; found {corners.shape}")
-    bad = ~(np.abs(corners) <= COORDINATE_LIMIT).all(axis=(1, 2))
-    if bad.any():
+    # NaN is the greatest and the least of all.
+    if not (corners.max() <= COORDINATE_LIMIT and corners.min() >= -COORDINATE_LIMIT):
+        bad = ~(np.abs(corners) <= COORDINATE_LIMIT).all(axis=(1, 2))
         first = int(np.argmax(bad))
         raise MeshError(
             f"triangle {first} of {len(corners)} has a corner that is not a finite number within +-2^126 (8.5e37): "
