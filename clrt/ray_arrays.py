@@ -1,4 +1,4 @@
-"""Arrays of rays as a caller gives them: checked, broadcast, and written into the records that kernels read."""
+"""Arrays of rays as a caller gives them: checked, broadcast, and laid out as kernels read them."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from clrt.errors import ClrtError, RayError
 
 _LARGEST_INTEGER = 2**53  #: beyond it, not every integer is a float64
+_SHARED_BIT = 4
 
 
 def numbers(values: ArrayLike, name: str, error: type[ClrtError] = RayError) -> NDArray[Any]:
@@ -64,13 +65,19 @@ class RayArrays:
     def __len__(self) -> int:
         return len(self.t_min)
 
-    def write(self, records: NDArray[np.void], first: int, scale: float) -> None:
-        """Rays from `first` on into `records` (layout.GIVEN_RAY), all but the limits times `scale`, a power of two: t stays what it is."""
-        part = slice(first, first + len(records))
-        with np.errstate(over="ignore", under="ignore", invalid="ignore"):
-            np.multiply(self.origins[part], scale, out=records["origin"], dtype=np.float64)
-            np.multiply(self.directions[part], scale, out=records["direction"], dtype=np.float64)
-            records["t_min"], records["t_max"] = self.t_min[part], self.t_max[part]
+    def columns(self, part: slice) -> tuple[list[NDArray[Any]], int]:
+        """Origins, directions, t_min, t_max of the rays `part` as kernels read them, and the bits that say how (given.cl).
+
+        float32 or float64, C order; one element where it serves all rays. No copy of what is in memory so already.
+        """
+        arrays, kinds = [], 0
+        for place, values in enumerate((self.origins, self.directions, self.t_min, self.t_max)):
+            shared = len(values) > 0 and values.strides[0] == 0
+            chosen = values[:1] if shared else values[part]
+            real = np.float32 if chosen.dtype == np.float32 else np.float64
+            arrays.append(np.require(chosen, real, ["C", "A"]))
+            kinds |= (real == np.float32) << place | shared << (_SHARED_BIT + place)
+        return arrays, kinds
 
 
 def _vectors(values: ArrayLike, name: str) -> NDArray[Any]:

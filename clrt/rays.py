@@ -20,6 +20,7 @@ from clrt.device.blocks import WideArrays, wide_arrays
 from clrt.device.context import open_device
 from clrt.device.pack import local_origin, pack
 from clrt.device.packed import Packed
+from clrt.device.ray_sort import FEWEST, RaySorter
 from clrt.device.session import Buffers, StageCounter
 from clrt.features import Features
 from clrt.forest.choose import build_trees
@@ -33,12 +34,11 @@ from clrt.scene.model import Scene
 #: unit normal (v1 - v0) x (v2 - v0), zero where nothing is hit
 HIT_DTYPE = layout.HIT_RECORD
 
-_CHUNK = 1 << 18  #: rays a launch: keeps buffers small and lets Ctrl-C in
+_CHUNK = 1 << 20  #: rays a launch: keeps buffers small and lets Ctrl-C in
 _LOCAL = 64  #: rays a work-group
-_FINISH_LOCAL = 64
 _LIST_LIMIT = 1 << 20  #: hits listed by a launch, but for a single ray that has more
 _FIRST, _ANY, _COUNT, _LIST = 0, 1, 2, 3  #: modes of the kernel `cast`
-_GIVEN, _RESULT, _HIT_LIST, _RAYS, _MODE, _STAGES = 10, 11, 12, 13, 14, 15  #: its arguments that change
+_GIVEN, _ORDER, _RECORDS, _RESULT, _HIT_LIST, _RAYS, _MODE, _STAGES = 11, 17, 18, 19, 20, 21, 22, 23  #: its arguments that change
 
 
 class RayCaster:
@@ -111,8 +111,8 @@ class RayCaster:
         """
         rays = RayArrays.of(origins, directions, t_min, t_max)
         hits = np.empty(len(rays), HIT_DTYPE)
-        for part in self._cast(rays, _FIRST):
-            self._finish(hits[part], None)
+        for _ in self._cast(rays, _FIRST, hits):
+            pass
         return hits.reshape(rays.shape)
 
     def any_hit(self, origins: ArrayLike, directions: ArrayLike, t_min: ArrayLike = 0.0, t_max: ArrayLike = np.inf) -> NDArray[np.bool_]:
@@ -163,13 +163,16 @@ class RayCaster:
         """Fills `hits` with all hits of the rays `part`; those of each begin at `starts`."""
         import pyopencl as cl
 
-        self._load(rays, part)
-        cl.enqueue_copy(self._device.queue, self._result, starts.astype(np.int32))
-        found = self._buffers.empty(8 * len(hits))
+        queue = self._device.queue
+        given = self._load(rays, part)
+        cl.enqueue_copy(queue, self._result, starts.astype(np.int32))
+        found, records = self._buffers.empty(8 * len(hits)), self._records(hits)
         self._cast_kernel.set_arg(_HIT_LIST, found)
-        self._launch(part.stop - part.start, _LIST)
+        self._launch(given, part.stop - part.start, _LIST)
         self._cast_kernel.set_arg(_HIT_LIST, None)  # later launches must not meet a buffer that is gone
-        self._finish(hits, found)
+        size = (-(-len(hits) // _LOCAL) * _LOCAL,)
+        self._list_kernel(queue, size, (_LOCAL,), self._buffers.vertices, self._sources, *given, found, records, np.int32(len(hits)))
+        self._fetch(records, hits)
 
     def _upload_wide(self, built: Any, wide: WideArrays) -> None:
         """Brings the wide trees to the device, and fills their blocks there."""
@@ -181,9 +184,9 @@ class RayCaster:
         record = layout.block(self.precision.real, wide.slots.shape[1]).itemsize
         self._blocks = buffers.empty(max(1, len(wide.slots)) * record)
         if wide.slots.size:
-            slots, size = buffers.upload(wide.slots), (-(-wide.slots.size // _FINISH_LOCAL) * _FINISH_LOCAL,)
+            slots, size = buffers.upload(wide.slots), (-(-wide.slots.size // _LOCAL) * _LOCAL,)
             kernel = cl.Kernel(built, "prepare_blocks")
-            kernel(self._device.queue, size, (_FINISH_LOCAL,), buffers.triangles, slots, self._blocks, np.int32(wide.slots.size))
+            kernel(self._device.queue, size, (_LOCAL,), buffers.triangles, slots, self._blocks, np.int32(wide.slots.size))
             self._device.queue.finish()
 
     def _set_arguments(self, built: Any) -> None:
@@ -191,31 +194,21 @@ class RayCaster:
         import pyopencl as cl
 
         packed, buffers = self._packed, self._buffers
-        surfaces = buffers.core[3]
-        self._cast_kernel, self._finish_kernel = cl.Kernel(built, "cast"), cl.Kernel(built, "cast_finish")
+        self._cast_kernel, self._list_kernel = cl.Kernel(built, "cast"), cl.Kernel(built, "cast_list")
+        extent = self.precision.real(packed.objects["extent"].max(initial=0.0))
         constant = (
-            self._wide, self._blocks, buffers.triangles, buffers.vertices, self._objects, surfaces, np.int32(len(self.trees)), np.int32(packed.slots),
-            np.array([*packed.origin, 0.0]), self.precision.real(packed.objects["extent"].max(initial=0.0)),
+            self._wide, self._blocks, buffers.triangles, buffers.vertices, self._objects, buffers.core[3], self._sources,
+            np.int32(len(self.trees)), np.int32(packed.slots), np.array([*packed.origin, 0.0]), extent,
         )  # fmt: skip
         for place, value in enumerate(constant):
             self._cast_kernel.set_arg(place, value)
         self._cast_kernel.set_arg(_HIT_LIST, None)
-        self._finish_kernel.set_arg(0, buffers.vertices)
-        self._finish_kernel.set_arg(1, self._sources)
+        corners = packed.vertices.reshape(-1, 3)
+        lo, hi = (corners.min(axis=0), corners.max(axis=0)) if len(corners) else (np.zeros(3), np.zeros(3))
+        self._sorter = RaySorter(buffers, built, lo, hi)
 
-    def _reserve(self, count: int) -> None:
-        """Room for `count` rays on the device, twice what there was at the least."""
-        if count <= self._capacity:
-            return
-        self._capacity = min(_CHUNK, max(count, 2 * self._capacity, 1024))
-        self._given = self._buffers.empty(layout.GIVEN_RAY.itemsize * self._capacity)
-        self._result = self._buffers.empty(4 * self._capacity)
-        for kernel, given, result in ((self._cast_kernel, _GIVEN, _RESULT), (self._finish_kernel, 2, 3)):
-            kernel.set_arg(given, self._given)
-            kernel.set_arg(result, self._result)
-
-    def _cast(self, rays: RayArrays, mode: int) -> Iterator[slice]:
-        """Casts a chunk after the other; gives the rays whose results will be on the device."""
+    def _cast(self, rays: RayArrays, mode: int, hits: NDArray[np.void] | None = None) -> Iterator[slice]:
+        """Casts a chunk after the other; gives the rays whose results are on the device, or, for _FIRST, in `hits`."""
         self._rays, self._counters = len(rays), None
         if self.precision.decides_in_stages:
             # New ones: a tenth of the time of setting old ones to zero through the queue.
@@ -223,23 +216,33 @@ class RayCaster:
             self._cast_kernel.set_arg(_STAGES, self._stages.buffer)
         for first in range(0, len(rays), _CHUNK):
             part = slice(first, min(first + _CHUNK, len(rays)))
-            self._load(rays, part)
-            self._launch(part.stop - part.start, mode)
+            given = self._load(rays, part)
+            records = None if hits is None else self._records(hits[part])
+            self._cast_kernel.set_arg(_RECORDS, records)
+            self._launch(given, part.stop - part.start, mode)
+            if hits is not None:
+                self._fetch(records, hits[part])
             yield part
 
-    def _load(self, rays: RayArrays, part: slice) -> None:
-        """Brings the rays `part` to the device. Mapped, not copied: on a CPU they are written where the kernel reads them."""
+    def _load(self, rays: RayArrays, part: slice) -> tuple[Any, ...]:
+        """The kernels' arguments for the rays `part`: on a CPU they are read where the caller has them."""
         import pyopencl as cl
 
-        queue, count, flags = self._device.queue, part.stop - part.start, cl.map_flags.WRITE_INVALIDATE_REGION
-        self._reserve(count)
-        records, _ = cl.enqueue_map_buffer(queue, self._given, flags, 0, (count,), layout.GIVEN_RAY)
-        rays.write(records, part.start, self._scale)
-        records.base.release(queue)
+        arrays, kinds = rays.columns(part)
+        flags = cl.mem_flags.READ_ONLY | cl.mem_flags.USE_HOST_PTR
+        given = (*(cl.Buffer(self._device.context, flags, hostbuf=array) for array in arrays), np.int32(kinds), np.float64(self._scale))
+        for place, value in enumerate(given, _GIVEN):
+            self._cast_kernel.set_arg(place, value)
+        if part.stop - part.start > self._capacity:
+            self._capacity = min(_CHUNK, max(part.stop - part.start, 2 * self._capacity, 1024))
+            self._result = self._buffers.empty(4 * self._capacity)
+            self._cast_kernel.set_arg(_RESULT, self._result)
+        return given
 
-    def _launch(self, count: int, mode: int) -> None:
+    def _launch(self, given: tuple[Any, ...], count: int, mode: int) -> None:
         import pyopencl as cl
 
+        self._cast_kernel.set_arg(_ORDER, self._sorter.order(given, count) if count >= FEWEST else None)
         self._cast_kernel.set_arg(_RAYS, np.int32(count))
         self._cast_kernel.set_arg(_MODE, np.int32(mode))
         cl.enqueue_nd_range_kernel(self._device.queue, self._cast_kernel, (-(-count // _LOCAL) * _LOCAL,), (_LOCAL,))
@@ -251,19 +254,19 @@ class RayCaster:
         cl.enqueue_copy(self._device.queue, results, self._result)
         return results
 
-    def _finish(self, hits: NDArray[np.void], found: Any) -> None:
-        """Fills `hits` from the slots that the last launch found, or those listed in the buffer `found`."""
+    def _records(self, hits: NDArray[np.void]) -> Any:
+        """A buffer that is `hits` itself, where the device shares its memory."""
         import pyopencl as cl
 
-        queue, flags = self._device.queue, cl.mem_flags.WRITE_ONLY | cl.mem_flags.USE_HOST_PTR
-        records = cl.Buffer(self._device.context, flags, hostbuf=hits)
-        for place, value in enumerate((found, np.int32(found is not None), np.int32(len(hits)), records), 4):
-            self._finish_kernel.set_arg(place, value)
-        cl.enqueue_nd_range_kernel(queue, self._finish_kernel, (-(-len(hits) // _FINISH_LOCAL) * _FINISH_LOCAL,), (_FINISH_LOCAL,))
-        # Where the device has memory of its own, this is what brings the records here.
-        mapped, _ = cl.enqueue_map_buffer(queue, records, cl.map_flags.READ, 0, hits.shape, hits.dtype)
-        mapped.base.release(queue)
-        queue.finish()
+        return cl.Buffer(self._device.context, cl.mem_flags.WRITE_ONLY | cl.mem_flags.USE_HOST_PTR, hostbuf=hits)
+
+    def _fetch(self, records: Any, hits: NDArray[np.void]) -> None:
+        """Waits for the records; where the device has memory of its own, this is what brings them here."""
+        import pyopencl as cl
+
+        mapped, _ = cl.enqueue_map_buffer(self._device.queue, records, cl.map_flags.READ, 0, hits.shape, hits.dtype)
+        mapped.base.release(self._device.queue)
+        self._device.queue.finish()
 
 
 def _sources(scene: Scene, packed: Packed) -> NDArray[np.void]:

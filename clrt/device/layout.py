@@ -110,8 +110,8 @@ def texture(real: type) -> np.dtype[np.void]:
 
 
 def wide_node(real: type, width: int) -> np.dtype[np.void]:
-    """A node of the wide tree (blocks.cl): planes of its children's boxes, by axis first the lower, then the upper ones; which node or block
-    each child is; the children from near to far, four bits an octant.
+    """A node of the wide tree (blocks.cl): planes of its children's boxes, by axis first the lower, then the upper ones; which node or
+    block each child is; the children from near to far, four bits an octant.
     """
     return struct_dtype([("planes", real, (6, width)), ("child", np.int32, (width,)), ("order", np.int32, (width,))])
 
@@ -125,7 +125,7 @@ def block(real: type, width: int) -> np.dtype[np.void]:
 
 _F8_VECTOR: Any = (np.float64, (3,))
 
-#: a ray of a caller's array, in float64; `scale` is the kernel's own
+#: a ray as given, in float64, its direction at about unit length: `scale` is the power of two that made it so
 GIVEN_RAY = struct_dtype(
     [("origin", *_F8_VECTOR), ("direction", *_F8_VECTOR), ("t_min", np.float64), ("t_max", np.float64), ("scale", np.float64)]
 )

@@ -35,12 +35,13 @@ _TREES = ("box.cl",)
 #: entry point -> files before effects that the traversal calls, between those and other effects, after all
 _ENTRIES = {
     "render": (("kdtree.cl", "hit.cl"), ("scene.cl", "surface.cl"), ("camera.cl", "prepare.cl", "render.cl")),
-    "cast": ((), ("blocks.cl",), ("after.cl", "prepare.cl", "cast.cl", "cast_finish.cl")),
+    "cast": (("given.cl",), ("blocks.cl",), ("after.cl", "prepare.cl", "hit_record.cl", "cast.cl", "ray_sort.cl")),
 }
 PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a packet, width and height
 TILE = (16, 8)  #: pixels of a tile, width and height: whole packets of any size
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
+SORT_BITS = 3  #: an axis, of the grid of origins by which rays are sorted; measured: more change nothing
 MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
 #: what stands at a place where no effect adds anything
 _DEFAULTS = {"trace": "        scene_trace(&geometry, &rays, 1, 0, &hits);", "next": "        break;",
@@ -133,7 +134,7 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     values: dict[str, int] = {"REAL_BITS": precision.bits, "LANES": lanes, "PACKET_WIDTH": width, "PACKET_HEIGHT": height,
                               "STACK_SIZE": shape.stack}  # fmt: skip
     if shape.block:
-        values["BLOCK"] = shape.block
+        values |= {"BLOCK": shape.block, "SORT_BITS": SORT_BITS}
     names = {f.name for f in features.active}
     if "sampling" in names:
         values |= {"TILE_WIDTH": TILE[0], "TILE_HEIGHT": TILE[1]}

@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from clrt.kdtree.parted import FloatArray, Ints, PartedTree, part
 from clrt.kdtree.tree import KdTree

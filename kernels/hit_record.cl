@@ -1,5 +1,5 @@
-// Provides: kernel cast_finish: the records of hits that cast found.
-// Needs: triangle.cl, structs.  Reads: nothing.
+// Provides: hit_record: the record of a hit.
+// Needs: triangle.cl, given.cl, structs.  Reads: nothing.
 
 // corner - (origin + s direction), a component: the difference and the product as unevaluated sums (Knuth 1969; Dekker 1971 by FMA), so
 // that it is off by at most 2u of itself and 4u^2 of |corner - origin| + |s direction|, u = 2^-53.
@@ -9,22 +9,18 @@ HOT double corner_seen(double corner, double origin, double direction, double s)
     return (high - product) + (low - rest);
 }
 
-// The record of each ray's first hit, or, `listed`, of each hit in `list`; by the numbers as given, in float64. With a = v0 - o, n = e1 x e2 and rate = d.n:
+// The record of the hit of a ray with the triangle `slot`, or of a miss where that is -1; by the numbers as given, in float64. With a = v0 - o,
+// n = e1 x e2 and rate = d.n:
 //   t = a.n / rate,  u = d.(e2 x a) / rate,  v = d.(a x e1) / rate.
 // No multiple of d added to a changes u and v, so they are taken from `near` = a - s d at s = t but for rounding, which is no longer than
 // the triangle however far the origin is; and t = s + near.n / rate.
-kernel void cast_finish(global const double *vertices, global const HitSource *sources, global const GivenRay *given,
-                        global const int *result, global const int2 *list, int listed, int count, global HitRecord *records) {
-    const int i = get_global_id(0);
-    if (i >= count) return;
-    const int slot = listed ? list[i].x : result[i];
+HOT void hit_record(global const double *vertices, global const HitSource *sources, const GivenRay *ray, int slot, global HitRecord *record) {
     if (slot < 0) {
         const HitRecord miss = {INFINITY, 0, 0, -1, -1, {0, 0, 0}};
-        records[i] = miss;
+        *record = miss;
         return;
     }
     global const double *corners = vertices + 9 * (size_t)slot;
-    global const GivenRay *ray = given + (listed ? list[i].y : i);
     double a[3], d[3], e1[3], e2[3], n[3], near[3], cross[3];
     for (int axis = 0; axis < 3; axis++) {
         a[axis] = corners[axis] - ray->origin[axis];
@@ -41,7 +37,6 @@ kernel void cast_finish(global const double *vertices, global const HitSource *s
     cross_double(near, e1, cross);
     double v = dot_double(d, cross) / rate;
     //@ finish
-    global HitRecord *record = records + i;
     record->t = t * ray->scale;
     record->u = u;
     record->v = v;
