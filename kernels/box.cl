@@ -1,4 +1,4 @@
-// Provides: RELATIVE_WIDENING, rays_reach, box_clip.
+// Provides: RELATIVE_WIDENING, rays_reach, box_clip, PlaneLines, plane_lines.
 // Needs: lanes.cl, rays.cl, structs.  Reads: nothing.
 //
 // The error of a computed distance t = (s - o) * (1/d) to a plane s, with u the unit roundoff:
@@ -7,6 +7,23 @@
 //   plane by pad = 2u (|o| + extent), hence of the distance by pad |1/d|.
 // The interval t +- (8u |t| + pad |1/d|) therefore holds the true distance, with a factor of two to spare for its own roundings.
 #define RELATIVE_WIDENING (R(8.0) * UNIT_ROUNDOFF)
+
+// Both ends of that interval as lines over s, for rays whose t_min is not negative: s * rate + start, rate = (1 -+ 8u) / d,
+// start = -o rate -+ 2 pad |1/d|. A rate is off by 2u of itself, the same 2u in both places, hence of t; o rate, s rate where it is not
+// fused, and the sum round by u (|o| + extent) |1/d| + u |t| more, which half a pad and the 8u cover. Behind the origin, where t < 0,
+// the ends lie on the wrong sides of 8u t, but below 0 as t does, which is all that is asked where t_near >= 0.
+typedef struct {
+    real_n low_rate[3], low_start[3], high_rate[3], high_start[3];
+} PlaneLines;
+
+HOT void plane_lines(const Rays *rays, const real_n *slab, PlaneLines *lines) {
+    for (int a = 0; a < 3; a++) {
+        lines->low_rate[a] = rays->inverse[a] * (R(1.0) - RELATIVE_WIDENING);
+        lines->high_rate[a] = rays->inverse[a] * (R(1.0) + RELATIVE_WIDENING);
+        lines->low_start[a] = -rays->origin[a] * lines->low_rate[a] - R(2.0) * slab[a];
+        lines->high_start[a] = -rays->origin[a] * lines->high_rate[a] + R(2.0) * slab[a];
+    }
+}
 
 // A bound on the distance from each ray's origin to any point of the object's triangles plus their longest edge.
 HOT real_n rays_reach(const Rays *rays, global const Object *object) {

@@ -1,4 +1,4 @@
-// Provides: Hit: what shading needs to know of the nearest hit of each ray; Shade: what it adds up; gather, normalize_n, face_towards.
+// Provides: Hit: what shading needs to know of the nearest hit of each ray; Shade: what it adds up; gather, gather_same, all_same, normalize_n, face_towards.
 // Needs: lanes.cl, rays.cl.  Reads: nothing.
 
 // Lane-wise reads: `expression` may use the lane number k.
@@ -9,6 +9,14 @@
         result = load_lanes(lane_);                               \
     }
 
+// The same where `same` says that all lanes read the same: packets that meet one surface are most, and one load is cheaper than many.
+#define gather_same(same, result, expression)   \
+    if (same) {                                 \
+        const int k = 0;                        \
+        result = (real_n)(real)(expression);    \
+    } else                                      \
+        gather(result, expression)
+
 typedef struct {
     real_n point[3];      // on the surface to within `error`
     real_n geometric[3];  // unit normal of the surface itself, towards the viewer
@@ -17,8 +25,11 @@ typedef struct {
     mask_n found;
     lane_int slot[LANES];      // what was hit; 0 in lanes that hit nothing
     lane_int material[LANES];
+    int one_material;          // 1 only where all lanes have the same
     //@ hit_members
 } Hit;
+
+HOT int all_same(const lane_int *lane) { return !any_lane(~is_equal(load_lanes(lane), (mask_n)lane[0])); }
 
 // The light that leaves the hits towards the viewer by itself.
 typedef struct {

@@ -10,6 +10,10 @@ HOT void kdtree_trace(const Geometry *geometry, global const Object *object, con
     active &= box_clip(object, rays, hits->t, slab, &t_enter, &t_leave);
     if (!any_lane(active)) return;
     const real_n reach = rays_reach(rays, object);
+    PlaneLines lines;
+    if (shared_origin) plane_lines(rays, slab, &lines);
+    // The two words of a node are loaded apart: the split goes to all lanes, the rest decides the way.
+    global const int *words = (global const int *)geometry->nodes;
     int stack_node[STACK_SIZE];
     real_n stack_near[STACK_SIZE], stack_far[STACK_SIZE];
     for (int octant = 0; octant < 8; octant++) {
@@ -19,14 +23,22 @@ HOT void kdtree_trace(const Geometry *geometry, global const Object *object, con
         real_n t_near = choose(lanes, t_enter, (real_n)INFINITY), t_far = choose(lanes, t_leave, (real_n)-INFINITY);
         int top = 0, node = object->root;
         for (;;) {
-            const int2 word = geometry->nodes[node];
-            const int axis = word.y & 3;
+            const size_t at = 2 * (size_t)node;
+            const int shape = words[at + 1], axis = shape & 3;
             if (axis != 3) {
                 // An inner node: the distance to its plane, as an interval.
-                const real_n t = ((real)as_float(word.x) - rays->origin[axis]) * rays->inverse[axis];
-                const real_n width = multiply_add(abs_n(t), (real_n)RELATIVE_WIDENING, slab[axis]);
-                const real_n t_low = t - width, t_high = t + width;
-                const int near_side = (octant >> axis) & 1, child = word.y >> 2;
+                const real split = (real)((global const float *)words)[at];
+                real_n t_low, t_high;
+                if (shared_origin) {
+                    t_low = multiply_add((real_n)split, lines.low_rate[axis], lines.low_start[axis]);
+                    t_high = multiply_add((real_n)split, lines.high_rate[axis], lines.high_start[axis]);
+                } else {
+                    const real_n t = (split - rays->origin[axis]) * rays->inverse[axis];
+                    const real_n width = multiply_add(abs_n(t), (real_n)RELATIVE_WIDENING, slab[axis]);
+                    t_low = t - width;
+                    t_high = t + width;
+                }
+                const int near_side = (octant >> axis) & 1, child = shape >> 2;
                 const mask_n live = is_at_most(t_near, t_far);
                 const mask_n go_near = live & ~is_less(t_high, t_near), go_far = live & ~is_greater(t_low, t_far);
                 if (!any_lane(go_far)) node = child + near_side;
@@ -42,8 +54,8 @@ HOT void kdtree_trace(const Geometry *geometry, global const Object *object, con
                 continue;
             }
             // A leaf: its triangles, one after the other, against all live lanes.
-            const int first = word.x, end = first + (word.y >> 2);
-            const mask_n live = is_at_most(t_near, t_far) & lanes;
+            const int first = words[at], end = first + (shape >> 2);
+            const mask_n live = is_at_most(t_near, t_far);
             //@ count_tests
             for (int i = first; i < end; i++) triangle_test(geometry, rays, reach, geometry->indices[i], shared_origin, live, hits);
             if (any_hit) {

@@ -2,7 +2,7 @@
 // Needs: hit.cl, structs.  Reads: nothing.
 HOT real_n mirror_weight(global const Material *materials, const Hit *hit) {
     real_n weight;
-    gather(weight, materials[hit->material[k]].reflect);
+    gather_same(hit->one_material, weight, materials[hit->material[k]].reflect);
     //@ mirror_weight
     return choose(hit->found, weight, (real_n)0);
 }

@@ -39,13 +39,14 @@ render_packet(const int column, const int row, global const Frame *frame, global
         // The light that leaves the hit points towards the viewer, without what other rays bring.
         Shade shade;
         real_n ambient;
-        gather(ambient, materials[hit.material[k]].ambient);
+        gather_same(hit.one_material, ambient, materials[hit.material[k]].ambient);
         //@ shade_begin
+        #pragma unroll
         for (int a = 0; a < 3; a++) shade.sum[a] = ambient;
         //@ light
         for (int a = 0; a < 3; a++) {
             real_n albedo;
-            gather(albedo, materials[hit.material[k]].color[a]);
+            gather_same(hit.one_material, albedo, materials[hit.material[k]].color[a]);
             //@ albedo
             real_n seen = choose(hit.found, albedo * shade.sum[a], (real_n)frame->background[a]);
             //@ channel

@@ -5,9 +5,9 @@
 HOT void sun_light(const Geometry *geometry, global const Sun *suns, int sun_count, global const Material *materials, const Rays *rays,
                    const Hit *hit, const int from_eye, real extent, real_n weight, Shade *shade) {
     real_n diffuse, specular, exponent;
-    gather(diffuse, materials[hit->material[k]].diffuse);
-    gather(specular, materials[hit->material[k]].specular);
-    gather(exponent, materials[hit->material[k]].exponent);
+    gather_same(hit->one_material, diffuse, materials[hit->material[k]].diffuse);
+    gather_same(hit->one_material, specular, materials[hit->material[k]].specular);
+    gather_same(hit->one_material, exponent, materials[hit->material[k]].exponent);
     for (int i = 0; i < sun_count; i++) {
         global const Sun *light = suns + i;
         real_n to_light[3];

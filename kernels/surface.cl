@@ -12,16 +12,23 @@ HOT void hit_surface(const Geometry *geometry, global const Frame *frame, global
     store_lanes(choose(hit->found, hits->slot, NO_LANES), hit->slot);
     real_n t = choose(hit->found, hits->t, (real_n)0);
     //@ hit_distance
+    #pragma unroll
     for (int a = 0; a < 3; a++) hit->point[a] = ray_point(rays, t, a);
     hit->error = (R(8.0) * UNIT_ROUNDOFF) * (rays->scale + t);
     lane_int record[LANES];
     for (int k = 0; k < LANES; k++) record[k] = hit->slot[k] < frame->triangle_slots ? hit->slot[k] : 0;
-    for (int k = 0; k < LANES; k++) hit->material[k] = surfaces[record[k]].material;
+    const int one_record = all_same(record);
+    if (one_record) store_lanes((mask_n)surfaces[record[0]].material, hit->material);
+    else
+        for (int k = 0; k < LANES; k++) hit->material[k] = surfaces[record[k]].material;
+    // Unrolled, so that what no effect asks for is not loaded.
+    #pragma unroll
     for (int a = 0; a < 3; a++) {
-        gather(hit->geometric[a], surfaces[record[k]].geometric[a]);
-        gather(hit->normal[a], surfaces[record[k]].normal[a]);
+        gather_same(one_record, hit->geometric[a], surfaces[record[k]].geometric[a]);
+        gather_same(one_record, hit->normal[a], surfaces[record[k]].normal[a]);
     }
     //@ hit_surface
+    hit->one_material = all_same(hit->material);
     face_towards(hit->geometric, rays->direction, 1);
     face_towards(hit->normal, hit->geometric, 0);
     //@ hit_faced
