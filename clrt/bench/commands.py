@@ -1,6 +1,6 @@
 """From files to a picture: whole processes, clrt beside scripts for other programs that make the same picture of the same triangles.
 
-First runs have an empty home and empty caches, so that nothing is left of an earlier one but what is installed; cached ones come after them.
+First runs have an empty home and empty caches, so that nothing is left of earlier ones but what is installed; cached runs come after.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -59,10 +59,10 @@ def picture_of(name: str, folder: Path) -> Path:
 
 def environment(home: Path) -> dict[str, str]:
     """As of this process, with a home and caches of its own: what PoCL, clrt and others keep between runs goes there."""
-    own = {"HOME": str(home), "XDG_CACHE_HOME": str(home / "cache"), "XDG_CONFIG_HOME": str(home / "config"), "POCL_CACHE_DIR": str(home / "pocl")}
+    own = {"HOME": home, "XDG_CACHE_HOME": home / "cache", "XDG_CONFIG_HOME": home / "config", "POCL_CACHE_DIR": home / "pocl"}
     for folder in own.values():
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    return {**os.environ, **own}
+        folder.mkdir(parents=True, exist_ok=True)
+    return {**os.environ, **{name: str(folder) for name, folder in own.items()}}
 
 
 def programs(folder: Path, size: int) -> tuple[list[Program], list[Missing]]:
@@ -126,8 +126,9 @@ def _pov(points: NDArray[np.float64], faces: NDArray[np.int64], view: dict[str, 
         return "<" + ",".join(f"{value:.9g}" for value in values) + ">"
 
     # Its camera is the image plane itself; its pixels' middles lie as everyone's.
-    ahead = view["corner"] + (view["along_row"] + view["along_column"]) / 2.0
-    camera = f"location {vector(view['eye'])} direction {vector(ahead)} right {vector(view['along_row'])} up {vector(-view['along_column'])}"
+    plane = {"direction": view["corner"] + (view["along_row"] + view["along_column"]) / 2.0, "right": view["along_row"],
+             "up": -view["along_column"]}  # fmt: skip
+    camera = " ".join(f"{name} {vector(values)}" for name, values in {"location": view["eye"], **plane}.items())
     corners = ",".join(f"<{x:.9g},{y:.9g},{z:.9g}>" for x, y, z in points.tolist())
     triples = ",".join(f"<{a},{b},{c}>" for a, b, c in faces.tolist())
     return (
@@ -168,9 +169,13 @@ def _first_runs(found: list[Program], missing: list[Missing], folder: Path, roun
             if program.name == CLRT:
                 raise
             missing.append(Missing(program.name, str(error)))
-    number = iter(range(rounds * len(working)))
-    contenders: dict[str, Callable[[], object]] = {p.name: lambda p=p: p.run(folder, folder / f"first-{next(number)}") for p in working}
+    homes = (folder / f"first-{number}" for number in range(rounds * len(working)))
+    contenders = {program.name: partial(_run_anew, program, folder, homes) for program in working}
     return interleave(contenders, rounds, warm_ups=0), working
+
+
+def _run_anew(program: Program, folder: Path, homes: Iterator[Path]) -> None:
+    program.run(folder, next(homes))
 
 
 def _differing(name: str, folder: Path) -> int:
@@ -191,8 +196,14 @@ def _phases(clrt: Program, folder: Path, home: Path) -> dict[str, float]:
 
 
 #: what is imported -> the statement; `python` is the interpreter alone, from start to end
-_IMPORTS = {"clrt": "import clrt", "embreex": "from embreex import rtcore_scene", "Mitsuba": "import mitsuba; mitsuba.set_variant('llvm_ad_rgb')",
-            "trimesh": "import trimesh", "Open3D": "import open3d", "Blender": "import bpy"}  # fmt: skip
+_IMPORTS = {
+    "clrt": "import clrt",
+    "embreex": "from embreex import rtcore_scene",
+    "Mitsuba": "import mitsuba; mitsuba.set_variant('llvm_ad_rgb')",
+    "trimesh": "import trimesh",
+    "Open3D": "import open3d",
+    "Blender": "import bpy",
+}
 _CLOCK = "import time; start = time.perf_counter(); {}; print(time.perf_counter() - start)"
 
 

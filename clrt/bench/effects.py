@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -20,6 +19,7 @@ import numpy as np
 
 from clrt.bench import machine
 from clrt.bench.export import BEGIN, END
+from clrt.bench.table import interval
 from clrt.cli import failure
 from clrt.device.context import Device, open_device
 from clrt.errors import ClrtError
@@ -29,7 +29,7 @@ from clrt.precision import DEFAULT, rung
 from clrt.renderer import build_trees, open_tracer, run_rows, with_options
 from clrt.scene.build import load_scene
 from clrt.scene.model import Scene
-from clrt.timing import FEWEST, Series, interleave, median_interval
+from clrt.timing import FEWEST, Series, interleave, paired
 
 _ROOT = Path(__file__).resolve().parents[2]
 _PAGE = _ROOT / "docs" / "effects.md"
@@ -51,12 +51,10 @@ class Row:
     again_s: float
 
     def cells(self) -> list[str]:
-        ratios = [a / b for a, b in zip(self.own.seconds, self.every.seconds, strict=True)]
-        low, high = median_interval(ratios)
         return [
             self.scene, ", ".join(self.effects), f"{self.own_bytes:,}", "equal" if self.differs == 0.0 else f"{self.differs:.1e}",
             f"{self.own.median * 1e3:.2f} ms", f"{self.every.median * 1e3:.2f} ms",
-            f"{statistics.median(ratios):.2f} ({low:.2f} to {high:.2f})", f"{self.cold_s:.2f} s", f"{self.again_s:.2f} s",
+            interval(paired(self.own.seconds, self.every.seconds).to_json()), f"{self.cold_s:.2f} s", f"{self.again_s:.2f} s",
         ]  # fmt: skip
 
 

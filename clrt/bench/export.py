@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import re
 from pathlib import Path
 from typing import Any
 
-from clrt.bench.report import ladder_table, markdown, tables, trees_table, versus_table
+from clrt.bench.plots import all_plots
+from clrt.bench.report import markdown, tables
+from clrt.bench.tables_peers import commands_table, versus_table
+from clrt.bench.tables_trees import ladder_table, trees_table
 from clrt.errors import ClrtError
 from clrt.files import atomic_write, check_writable
 
 BEGIN, END = "<!-- bench:begin -->", "<!-- bench:end -->"
 _PLACE = re.compile(rf"{re.escape(BEGIN)}\n.*?{re.escape(END)}", re.S)
-_KEYS = ("started", "quick", "machine", "scenes", "trees", "versus", "incoherent", "ladder", "tests", "command", "programs", "marks")
+#: what may be measured, in this order
+PARTS = ("versus", "incoherent", "ladder", "trees", "tests", "commands", "imports", "programs", "growth")
+_KEYS = ("started", "quick", "machine", "scenes", "marks")
 
 
 def save(results: dict[str, Any], folder: Path) -> Path:
@@ -41,6 +47,8 @@ def read(path: Path) -> dict[str, Any]:
 
 def check_docs(root: Path) -> None:
     """Raise ClrtError where the checkout at `root` has no marked places, OSError where they cannot be written: before the work."""
+    if importlib.util.find_spec("matplotlib") is None:
+        raise ClrtError("the plots of the documentation need matplotlib; `pip install 'clrt[bench]'` brings it")
     for path in _documents(root):
         if not path.is_file():
             raise ClrtError(f"{path}: no such file; --write-docs works in a checkout")
@@ -50,24 +58,31 @@ def check_docs(root: Path) -> None:
 
 
 def write_docs(results: dict[str, Any], root: Path) -> list[Path]:
-    """Put all tables into docs/performance.md, the main ones into README.md, the ladder into docs/numerics.md; returns these.
+    """Put all tables and plots into docs/performance.md, the main tables into README.md, the ladder into docs/numerics.md; returns what
+    was written.
 
     Raises as `check_docs`.
     """
     if results["quick"]:
         raise ClrtError("a quick run is not for the documentation; leave out --quick")
+    if missing := [part for part in PARTS if part not in results]:
+        raise ClrtError(f"the documentation has a place for every part, and the run has no {missing[0]}; leave out --only")
     check_docs(root)
     page, readme, numerics = _documents(root)
-    main = [
-        trees_table(results["trees"]),
-        versus_table(results["versus"], results["machine"]["cores"]),
-    ]
+    written = [page, readme, numerics]
+    for plot in all_plots(results):
+        written.append(root / "docs" / "images" / f"{plot.key}.svg")
+        written[-1].parent.mkdir(exist_ok=True)
+        with atomic_write(written[-1]) as file:
+            file.write(plot.svg)
+    main = [versus_table(results["versus"]), commands_table(results["commands"]), trees_table(results["trees"])]
     chosen = ((page, tables(results)), (readme, main), (numerics, [ladder_table(results["ladder"])]))
-    for path, text in ((path, markdown(results, each, level=3)) for path, each in chosen):
+    for path, shown in chosen:
+        text = markdown(results, shown, 3, "images" if path is page else None)
         before, _, after = path.read_text(encoding="utf-8").partition(BEGIN)
         with atomic_write(path) as file:
             file.write(f"{before}{BEGIN}\n{text}\n{END}{after.partition(END)[2]}".encode())
-    return [page, readme, numerics]
+    return written
 
 
 def _documents(root: Path) -> tuple[Path, Path, Path]:

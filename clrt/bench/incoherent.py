@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from clrt.bench.machine import cores
 from clrt.bench.peers import Embreex, RaySet, embreex_available
 from clrt.bench.scenes import BenchScene
+from clrt.bench.view import largest_mesh
 from clrt.device.context import Device
 from clrt.precision import DEFAULT
 from clrt.rays import RayCaster
-from clrt.timing import interleave
+from clrt.timing import interleave, paired
 
 FloatArray = NDArray[np.float64]
 
@@ -57,7 +58,7 @@ def scattered_rays(mesh: FloatArray, count: int, seed: int) -> tuple[FloatArray,
 
 def measure_incoherent(bench: BenchScene, count: int, rounds: int, device: Device) -> dict[str, Any]:
     """Million rays a second of both tracers over `count` rays from the largest mesh, in turns; and how many hit otherwise."""
-    mesh = max((item.vertices for item in bench.scene.objects), key=len)
+    mesh = largest_mesh(bench)
     room = np.concatenate([mesh, closed_room(mesh)])
     origins, directions = (a.astype(np.float32).astype(np.float64) for a in scattered_rays(mesh, count, 1))
     caster = RayCaster(room, DEFAULT, device=device.info.name)
@@ -73,5 +74,7 @@ def measure_incoherent(bench: BenchScene, count: int, rounds: int, device: Devic
         if embreex_available():
             result["rays_that_differ"] = int(np.count_nonzero(peer.nearest(rays).prim != caster.first_hit(origins, directions)["prim_id"]))
     result["seconds"] = {name: times.to_json() for name, times in series.items()}
-    result["rates"] = {name: count / times.best / 1e6 for name, times in series.items()}
+    result["rates"] = {name: count / times.median / 1e6 for name, times in series.items()}
+    if "embreex" in series:
+        result["ratio"] = paired(series["embreex"].seconds, series["clrt"].seconds).to_json()
     return result

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 from functools import partial
 from typing import Any
 
@@ -12,7 +11,7 @@ from clrt.features import Features
 from clrt.precision import RUNGS, rung
 from clrt.renderer import build_trees, open_tracer
 from clrt.scene.model import Scene
-from clrt.timing import interleave
+from clrt.timing import interleave, paired
 
 BASE = "fast"  #: what the others are compared with
 
@@ -33,10 +32,8 @@ def _rows(scene: Scene, rounds: int, device: Device) -> list[dict[str, Any]]:
     series = interleave({name: partial(tracer.run, 0, tracer.height) for name, tracer in tracers.items()}, rounds)
     base, rows = series[BASE], []
     for name, tracer in tracers.items():
-        by_round = sorted(own / other for own, other in zip(series[name].seconds, base.seconds, strict=True))
         rows.append({
-            "rung": name, "render_s": series[name].to_json(), "ratio": series[name].best / base.best,
-            "ratio_median": statistics.median(by_round), "ratio_range": [by_round[0], by_round[-1]],
+            "rung": name, "render_s": series[name].to_json(), "ratio": paired(series[name].seconds, base.seconds).to_json(),
             "decided": _per_launch(tracer.stages.read(), rounds + 1) if tracer.stages is not None else None,
         })  # fmt: skip
     return rows

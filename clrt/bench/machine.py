@@ -28,7 +28,7 @@ def describe(device: DeviceInfo) -> dict[str, Any]:
         "opencl_version": device.version,
         "opencl_driver": device.driver,
         "lanes": device.lanes,
-        "packages": {name: _version(name) for name in ("numpy", "pyopencl", "embreex", "trimesh")},
+        "packages": {name: _version(name) for name in ("numpy", "pyopencl", "embreex", "trimesh", "mitsuba", "open3d", "bpy")},
         "clrt": __version__,
         "commit": _commit(),
     }

@@ -1,20 +1,16 @@
-"""The measurements of one scene: trees against brute force, tests a ray, the whole command, the specialised program."""
+"""The measurements of one scene by itself: trees against brute force, tests a ray; and how much of everything is measured."""
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from pathlib import Path
 from typing import Any
 
+from clrt.bench.growth import Reach
 from clrt.bench.scenes import BenchScene
 from clrt.bench.versus import opened
 from clrt.device.context import Device
-from clrt.errors import ClrtError
 from clrt.renderer import build_trees, render, run_rows
 from clrt.scene.model import Scene
 from clrt.stats import RunStats
@@ -33,27 +29,35 @@ class Plan:
         neighbouring pixels that lie far apart, fewer rays go the same way, and brute force looks slower than it is
     brute_limit : pixels times triangles beyond which it takes too long
     brute_count_size : of the picture that its tests are counted in, at most: counting takes longer than tracing
-    versus_size, count_size, command_size : of the other measurements
+    view_sizes : of the pictures that other tracers are compared in
+    count_size, ladder_size, command_size : of the other measurements
     incoherent_rays : of rays that go all ways
-    ladder_rounds : of the rungs' pictures, whose times lie so near each other that they want more
+    rounds, peer_rounds, ladder_rounds, command_rounds : of trees and brute force; beside peers, where intervals are wanted; of the rungs'
+        pictures, whose times lie so near each other that they want more; of whole commands and imports
+    reach : of the growth curves
     """
 
     rounds: int = 5
+    peer_rounds: int = 11
+    ladder_rounds: int = 15
+    command_rounds: int = 7
     sizes: tuple[int, ...] = (256, 512, 1024)
     sample: int = 256
     brute_limit: int = 10_000_000_000
     brute_count_size: int = 64
-    versus_size: int = 1024
+    view_sizes: tuple[int, ...] = (512, 1024)
     count_size: int = 1024
+    ladder_size: int = 1024
     command_size: int = 512
-    ladder_rounds: int = 15
     incoherent_rays: int = 1_000_000
+    reach: Reach = field(default_factory=Reach)
 
 
 FULL = Plan()
 QUICK = Plan(
-    rounds=2, sizes=(32,), sample=16, brute_limit=500_000, brute_count_size=16, versus_size=64, count_size=64, command_size=64,
-    ladder_rounds=2, incoherent_rays=2000,
+    rounds=2, peer_rounds=2, ladder_rounds=2, command_rounds=1, sizes=(32,), sample=16, brute_limit=500_000, brute_count_size=16,
+    view_sizes=(64,), count_size=64, ladder_size=64, command_size=64, incoherent_rays=2000,
+    reach=Reach(triangles=10_000, pixels=128, separate=10, instances=100, size=64, rounds=2),
 )  # fmt: skip
 
 
@@ -152,20 +156,3 @@ def count_tests(bench: BenchScene, size: int, device: Device) -> list[dict[str, 
         for stats in counted
     ]  # fmt: skip
 
-
-def measure_command(bench: BenchScene, size: int, rounds: int, scratch: Path) -> dict[str, Any]:
-    """Wall time of `clrt scene.txt -o picture.png` as a process, after one run that fills the kernel cache; the phases of one more."""
-    figures_file = scratch / "figures.json"
-    command = [sys.executable, "-m", "clrt", str(bench.path.resolve()), "--size", f"{size}x{size}", "-o", str(scratch / "picture.png")]
-    series = interleave({"command": partial(_run, command)}, rounds)["command"]
-    _run([*command, "--stats", str(figures_file)])
-    phases = json.loads(figures_file.read_text())
-    wanted = ("read_s", "build_s", "upload_s", "compile_s", "render_s", "write_s", "total_s")
-    return {"scene": bench.name, "size": size, "seconds": series.to_json(), "phases": {name: phases[name] for name in wanted}}
-
-
-def _run(command: list[str]) -> None:
-    """Raises ClrtError with what the command said where it fails."""
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise ClrtError(f"{' '.join(command)} ended with {done.returncode}: {done.stderr.strip()}")

@@ -24,7 +24,7 @@ F64 = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _BLOCK = 1024  #: consecutive rays of one thread: near each other for its caches, dealt out in turns for equal shares
-_SHADOW_OFFSET = 8e-6  #: of the diagonal of the largest mesh: of 1e-7 to 1e-4, where Embree's shadows differ little from clrt's on any scene
+_SHADOW_OFFSET = 8e-6  #: of the diagonal of the largest mesh: where Embree's shadows differ little from clrt's on any scene
 
 
 def embreex_available() -> bool:

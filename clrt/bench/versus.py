@@ -84,7 +84,8 @@ def _one_size(scene: Scene, rounds: int, device: Device, peers: Peers, embreex: 
     size = scene.camera.width
     turns, tracers = Round(), {name: _tracers(scene, name, device) for name in RUNGS}
     counted = render(scene, device=device.info.name, count=True).stats
-    assert counted is not None and counted.ray_counts is not None  # a picture that is counted has them
+    assert counted is not None
+    assert counted.ray_counts is not None  # a picture that is counted has them
     for name, three in tracers.items():
         turns.contenders |= {f"clrt {name}, {what}": partial(tracer.run, 0, size) for what, tracer in three.items()}
         turns.rays[f"clrt {name}"] = {kind: counted.ray_counts[kind] for kind in ("primary", "shadow")}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import shutil
 import subprocess
@@ -21,7 +22,7 @@ _COMPILERS = ("c++", "g++", "clang++")
 _FLAGS = ("-std=c++17", "-O3", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-DNDEBUG", "-pthread")
 _WIDE = "-mprefer-vector-width=512"  #: not every compiler knows it
 _LIBRARIES = ("-lembree4", "-lembree3")
-#: what a table calls it -> module of clrt.bench.workers, package that it needs, kinds of rays that it is given
+#: what a table calls it -> module of clrt.bench.workers, package that it needs
 _PYTHON = {
     "Mitsuba": ("mitsuba_rays", "mitsuba"),
     "Open3D": ("open3d_rays", "open3d"),
@@ -57,10 +58,8 @@ class Worker:
     def ask(self, *words: object) -> list[str]:
         """The answer to a line. Raises ClrtError where the process has ended, with what it said last."""
         assert self._process.stdin is not None
-        try:
+        with contextlib.suppress(BrokenPipeError):  # the answer tells
             print(*words, file=self._process.stdin, flush=True)
-        except BrokenPipeError:
-            pass  # the answer tells
         return self._answer().split()
 
     def run(self, *words: object) -> Told:
@@ -81,7 +80,8 @@ class Worker:
     def close(self) -> None:
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
-                pipe.close()
+                with contextlib.suppress(BrokenPipeError):  # it has ended by itself
+                    pipe.close()
         try:
             self._process.wait(timeout=10)
         except subprocess.TimeoutExpired:

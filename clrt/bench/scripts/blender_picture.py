@@ -1,4 +1,4 @@
-"""The picture by Blender: Cycles on the processor, one sample in the middle of each pixel. Also runs as `blender -b --python FILE -- ...`."""
+"""The picture by Blender: Cycles on the processor, a sample in the middle of each pixel. Runs as `blender -b --python FILE -- ...`, too."""
 
 import json
 import sys
@@ -24,8 +24,8 @@ matt.inputs["Color"].default_value = (0.9, 0.9, 0.9, 1)
 glow.inputs["Color"].default_value = (0.1, 0.1, 0.1, 1)
 links.new(matt.outputs[0], both.inputs[0])
 links.new(glow.outputs[0], both.inputs[1])
+links.new(nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"], glow.inputs["Strength"])  # it lights nothing else
 links.new(both.outputs[0], out.inputs["Surface"])
-material.cycles.emission_sampling = "NONE"  # it glows, but lights nothing
 mesh.data.materials.clear()
 mesh.data.materials.append(material)
 

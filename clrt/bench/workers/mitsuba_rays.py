@@ -1,4 +1,4 @@
-"""Mitsuba 3, variant llvm_ad_rgb: bare queries of rays that lie ready, with its hint that they are coherent; compiled before they are timed."""
+"""Mitsuba 3, variant llvm_ad_rgb: bare queries of rays that lie ready, marked as coherent; compiled before they are timed."""
 
 from __future__ import annotations
 

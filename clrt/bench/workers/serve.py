@@ -12,6 +12,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TextIO
 
 import numpy as np
@@ -55,7 +56,7 @@ def serve(make: Callable[[Floats, int], Tracer]) -> None:
         elif what == "hits":
             _say(out, tracer.met(tracer.trace(rays[words[0]])))
         else:
-            _say(out, *_timed(tracer.build if what == "build" else lambda name=words[0]: tracer.trace(rays[name])))
+            _say(out, *_timed(tracer.build if what == "build" else partial(tracer.trace, rays[words[0]])))
 
 
 def _timed(run: Callable[[], object]) -> tuple[float, float]:

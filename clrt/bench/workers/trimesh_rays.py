@@ -18,7 +18,7 @@ class Trimesh(Tracer):
 
     def build(self) -> None:
         faces = np.arange(3 * len(self._triangles)).reshape(-1, 3)
-        self._mesh = trimesh.Trimesh(self._triangles.reshape(-1, 3), faces, process=False)
+        self._mesh: Any = trimesh.Trimesh(self._triangles.reshape(-1, 3), faces, process=False)
         self._mesh.ray.intersects_first([[0.0, 0.0, 0.0]], [[1.0, 1.0, 1.0]])
 
     def prepare(self, rays: Floats) -> Any:
