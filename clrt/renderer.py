@@ -12,10 +12,11 @@ from pathlib import Path
 from clrt.adaptive import request as accuracy
 from clrt.adaptive.replicates import Replicates
 from clrt.adaptive.request import Foretell, Request
-from clrt.device import program
+from clrt.device import ahead, kernel_cache, program
+from clrt.device.ahead import Compilation
 from clrt.device.context import Device, open_device
 from clrt.device.pack import pack, tree_origins
-from clrt.device.session import Buffers, Tracer, check_picture
+from clrt.device.session import Buffers, Tracer, check_picture, shares_lights
 from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
 from clrt.features.choice import effect_names, not_called_for
@@ -23,6 +24,8 @@ from clrt.files import atomic_write
 from clrt.forest import choose as forest
 from clrt.image.image import Image
 from clrt.kdtree.boxtree import depth_limit
+from clrt.kdtree.common import default_max_depth
+from clrt.kdtree.saved import saved_trees
 from clrt.kdtree.tree import KdTree
 from clrt.precision import DEFAULT, Precision, rung
 from clrt.scene.model import Scene
@@ -30,6 +33,8 @@ from clrt.scene.placed import placement_count, seen
 from clrt.scene.scale import at_working_size
 from clrt.scene.words.frame import MOST_SAMPLES
 from clrt.stats import ObjectStats, RunStats
+from clrt.store import Store
+from clrt.tasks import Task
 
 Progress = Callable[[str, float], None]
 
@@ -68,6 +73,8 @@ def render(
     standard_error: bool = False,
     deadline: float | None = None,
     foretell: Foretell | None = None,
+    cache: bool = False,
+    opening: Task[Device] | None = None,
 ) -> Image:
     """The picture of `scene`, with the figures of the run in its `stats`.
 
@@ -78,6 +85,7 @@ def render(
     error, within : samples where they bring most until the relative error is below `error`, or `within` seconds from the call on have gone
     standard_error : the picture has one, also with `samples`, which are split over independent sequences then
     deadline : time.perf_counter() at which `within` ends, where it counts from another moment; foretell : called with the forecast
+    cache : keep trees in the user's cache folder, and take them from there; opening : the device, which another thread opens
     Raises DeviceError, LimitError, ClrtError, OSError.
     """
     start = time.perf_counter()
@@ -85,15 +93,16 @@ def render(
     tell = progress or (lambda phase, fraction: None)
     names = effect_names(without)
     scene = with_options(scene, size, depth, request.samples(samples), seed)
-    ladder, opened = rung(precision), open_device(device)
+    ladder, opened = rung(precision), open_device(device) if opening is None else opening.result()
     check_picture(opened, scene.camera.width, scene.camera.height)
     features = _features(scene, names)
     if request:
         accuracy.check_sampled(features)
         request.goal(scene.samples)
-    prepared = build_trees(scene, tree, tell, opened)
-    build_end = time.perf_counter()
-    buffers, tracer, source, upload_s = open_tracer(prepared, features, ladder, opened, tell)
+    with _begin_program(scene, features, ladder, opened) as begun:
+        prepared = build_trees(scene, tree, tell, opened, Store(kernel_cache.own_folder("trees")) if cache else None)
+        build_end = time.perf_counter()
+        buffers, tracer, source, upload_s = open_tracer(prepared, features, ladder, opened, tell, begun)
     compile_s = time.perf_counter() - build_end - upload_s
     if dump_kernel is not None:
         with atomic_write(dump_kernel) as file:
@@ -163,18 +172,21 @@ def _with_sampling(scene: Scene, samples: int | None, seed: int) -> Scene:
     return replace(scene, samples=samples, seed=seed)
 
 
-def build_trees(scene: Scene, tree: str, tell: Progress, device: Device | None = None) -> Prepared:
-    """A kd-tree an object, over coordinates relative to the object's origin; by the device, where one is given and sooner."""
-    meshes = [item.vertices for item in scene.objects]
-    trees, seconds = forest.build_trees(meshes, tree_origins(scene), tree, device, partial(tell, "trees"))
+def build_trees(scene: Scene, tree: str, tell: Progress, device: Device | None = None, store: Store | None = None) -> Prepared:
+    """A kd-tree an object, over coordinates relative to the object's origin; by the device, where one is given and sooner.
+
+    store : where trees of earlier runs are
+    """
+    build = partial(forest.build_trees, builder=tree, device=device, tell=partial(tell, "trees"))
+    trees, seconds = saved_trees(store, [item.vertices for item in scene.objects], tree_origins(scene), tree, build)
     return Prepared(scene, tuple(trees), tuple(seconds))
 
 
 def program_shape(prepared: Prepared, features: Features, shared_lights: bool) -> program.Shape:
-    """The sizes that the program of these features is compiled for."""
-    deepest = max((t.depth for t in prepared.trees), default=0)
+    """The sizes that the program of these features is compiled for: trees as deep as they may become, so that they need not be there."""
     bounces = any(f.name == "bounce" for f in features.active)
     scene = prepared.scene
+    deepest = max([default_max_depth(len(o)) for o in scene.objects] + [t.depth for t in prepared.trees], default=0)
     boxes = depth_limit(len(scene.objects) + placement_count(scene) + len(scene.spheres))
     return program.Shape(program.stack_size(deepest), scene.depth if bounces else 0, shared_lights, program.stack_size(boxes))
 
@@ -197,13 +209,25 @@ def fill_buffers(prepared: Prepared, features: Features, precision: Precision, d
     return buffers, program.compose(features, precision, lanes, program_shape(prepared, features, buffers.shared_lights)), upload_s
 
 
+def _begin_program(scene: Scene, features: Features, precision: Precision, device: Device) -> Compilation:
+    """Begins to compile the program that the scene will need, as far as is known before it is packed. Raises LimitError."""
+    names = {f.name for f in features.active}
+    called = Prepared(seen(scene, "instances" in names, "motion" in names), (), ())
+    lanes, shape = precision.lanes(device.info.lanes), program_shape(called, features, shares_lights(called.scene, precision, device))
+    program.check_limits(precision, lanes, shape, features)
+    return Compilation(device, program.compose(features, precision, lanes, shape), called.scene.triangle_count)
+
+
 def open_tracer(
-    prepared: Prepared, features: Features, precision: Precision, device: Device, tell: Progress
+    prepared: Prepared, features: Features, precision: Precision, device: Device, tell: Progress, begun: Compilation | None = None
 ) -> tuple[Buffers, Tracer, str, float]:
-    """Buffers filled and program built; also its source, and the seconds of packing, upload and preparing."""
+    """Buffers filled and program built; also its source, and the seconds of packing, upload and preparing.
+
+    begun : the program that another thread compiles, taken if it is the one that is needed
+    """
     tell("compile", 0.0)
     buffers, source, upload_s = fill_buffers(prepared, features, precision, device)
-    built = program.build(device, source)
+    built = ahead.build(device, source, begun)
     tracer = Tracer(buffers, built)
     tracer.warm_up()
     tell("compile", 1.0)
@@ -222,7 +246,7 @@ def run_rows(tracer: Tracer, phase: str, tell: Progress) -> None:
     count = passes(scene, tracer.buffers.features)
     for sample in range(count):
         if sampled:
-            tracer.begin_sample(sample)
+            tracer.begin_samples(sample, sample + 1)
         row = 0
         while row < tracer.height:
             tell(phase, (sample + row / tracer.height) / count)
@@ -256,7 +280,7 @@ def _count(prepared: Prepared, buffers: Buffers, stats: RunStats, tell: Progress
     if replicates is None:
         run_rows(tracer, "count", tell)
     else:
-        Replicates(tracer).replay(replicates.launches)
+        Replicates(tracer, replicates.count).replay(replicates.launches)
     kinds = buffers.features.ray_kinds
     stats.ray_counts = {kind: int(n) for kind, n in zip(kinds, tracer.counts, strict=False)}
     rays = max(1, sum(stats.ray_counts.values()))

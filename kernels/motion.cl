@@ -27,7 +27,7 @@ HOT void motion_enter(const Geometry *geometry, global const Placement *from, Ra
     real time[LANES];                    // of the sample
 //@end
 //@hook begin
-    const real_n sample_time = shutter_times(frame, column, row, (uint)sample_range[0]);
+    const real_n sample_time = shutter_times(frame, column, row, sample, seed);
     store_lanes(sample_time, geometry.time);
 //@end
 //@hook placed_enter_default

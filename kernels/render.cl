@@ -7,6 +7,7 @@ render_packet(const int column, const int row, global const Frame *frame, global
                    global const Triangle *triangles, global const EdgePlanes *eye_planes, global const double *vertices, global const Object *objects,
                    global const Surface *surfaces, global const Material *materials, int end_row, global float *film
                    //@ parameters
+                   //@ packet_parameters
 ) {
     Geometry geometry;
     geometry.nodes = nodes;
@@ -76,7 +77,9 @@ void render(global const Frame *frame, global const int2 *nodes, global const in
     int column = get_global_id(0) * PACKET_WIDTH, row = first_row + get_global_id(1) * PACKET_HEIGHT;
     //@ packet
     if (column >= frame->width || row >= end_row) return;
+    //@ repeat
     render_packet(column, row, frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces, materials, end_row, film
                   //@ arguments
+                  //@ packet_arguments
     );
 }

@@ -1,9 +1,10 @@
 // Provides: sampling_camera, sampling_store: one sample of each pixel, and the mean of those so far.
 // Needs: sampler.cl, lanes.cl, rays.cl, structs.  Reads: PACKET_WIDTH, PACKET_HEIGHT (their product is LANES), TILE_WIDTH, TILE_HEIGHT.
 //
-// `sample_range` holds the number of the sample and how many were added up before. Sums are taken in float64, sample after sample, so
-// they do not depend on how the picture is cut into launches; after n additions the relative error is below n 2^-53.
-// Then comes the number of tiles, and column and row of the first pixel of each; none: rows as they are launched.
+// `sample_range` holds the first sample and the one behind the last, all of which a launch adds up pixel by pixel, then the number of tiles;
+// none: rows as they are launched. Of each tile four words follow: column and row of its first pixel, which are multiples of a tile's width
+// and height, the seed, and the place of its sums, counted in tiles: there they lie tile by tile. Sums are taken in float64, sample after sample, so they do not depend on how the picture is cut into launches;
+// after n additions the relative error is below n 2^-53.
 
 // The rays of camera_rays, moved from the pixel's centre and the eye by what effects add. `extent` is as in rays_prepare.
 HOT void sampling_camera(global const Frame *frame, int column, int row, uint sample, uint seed, Rays *rays) {
@@ -34,26 +35,44 @@ HOT void sampling_camera(global const Frame *frame, int column, int row, uint sa
     rays_prepare(rays, extent);
 }
 
-static inline void sampling_store(global const int *sample_range, global double *sample_sums, size_t at, real value, global float *film) {
-    const int before = sample_range[1];
-    const double sum = (before > 0 ? sample_sums[at] : 0.0) + (double)value;
-    sample_sums[at] = sum;
-    film[at] = (float)(sum / (before + 1));
+// Sample 0 begins the sum.
+static inline double sampling_add(uint sample, global double *sum, real value) {
+    return *sum = (sample > 0 ? *sum : 0.0) + (double)value;
 }
 
-//@hook camera
-    const uint sample = (uint)sample_range[0], seed = (uint)frame->seed;
-    sampling_camera(frame, column, row, sample, seed, &rays);
-//@end
-//@hook store
-        for (int a = 0; a < 3; a++) sampling_store(sample_range, sample_sums, 3 * ((size_t)y * frame->width + x) + a, out[a][k], film);
-//@end
 //@hook packet
+    uint seed = (uint)frame->seed;
+    size_t tile_at = 0;
     if (sample_range[2] > 0) {
         const int across = TILE_WIDTH / PACKET_WIDTH, packets = across * (TILE_HEIGHT / PACKET_HEIGHT);
         const int number = get_global_id(1) * get_global_size(0) + get_global_id(0), tile = number / packets, place = number % packets;
         if (tile >= sample_range[2]) return;
-        column = sample_range[3 + 2 * tile] + place % across * PACKET_WIDTH;
-        row = sample_range[4 + 2 * tile] + place / across * PACKET_HEIGHT;
+        global const int *given = sample_range + 3 + 4 * tile;
+        column = given[0] + place % across * PACKET_WIDTH;
+        row = given[1] + place / across * PACKET_HEIGHT;
+        seed = (uint)given[2];
+        tile_at = (size_t)given[3] * (TILE_WIDTH * TILE_HEIGHT);
     }
+//@end
+//@hook repeat
+    for (uint sample = (uint)sample_range[0]; sample < (uint)sample_range[1]; sample++)
+//@end
+//@hook packet_parameters
+                   , const uint sample, const uint seed, const size_t tile_at
+//@end
+//@hook packet_arguments
+                  , sample, seed, tile_at
+//@end
+//@hook camera
+    sampling_camera(frame, column, row, sample, seed, &rays);
+//@end
+//@hook store
+        const size_t at = (size_t)y * frame->width + x, in_tile = tile_at + y % TILE_HEIGHT * TILE_WIDTH + x % TILE_WIDTH;
+        for (int a = 0; a < 3; a++) {
+            if (sample_range[2] > 0) {
+                sampling_add(sample, sample_sums + 3 * in_tile + a, out[a][k]);
+            } else {
+                film[3 * at + a] = (float)(sampling_add(sample, sample_sums + 3 * at + a, out[a][k]) / (sample + 1));
+            }
+        }
 //@end

@@ -12,7 +12,7 @@ from sampled_scenes import lamp, objects
 
 from clrt import renderer
 from clrt.adaptive.engine import Engine, Goal, Outcome
-from clrt.adaptive.replicates import Replicates
+from clrt.adaptive.replicates import HALVES, Replicates
 from clrt.device.context import Device
 from clrt.features import Features
 from clrt.precision import rung
@@ -112,8 +112,8 @@ class Renders:
     def run(self, seed: int, goal: Goal) -> Outcome:
         return self.engine(seed, goal).run()
 
-    def engine(self, seed: int, goal: Goal) -> Engine:
-        return Engine(Replicates(self.tracer, seed), goal, lambda part: None, lambda told: None, None)
+    def engine(self, seed: int, goal: Goal, count: int = HALVES) -> Engine:
+        return Engine(Replicates(self.tracer, count, seed), goal, lambda part: None, lambda told: None, None)
 
     def truth(self, samples: int, seed: int = 10**9) -> tuple[FloatArray, float]:
         """(h, w, 3) by uniform samples of seeds that nothing else has, and the root mean square of its own error."""

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from clrt.adaptive.ledger import Ledger
 from clrt.adaptive.moments import moments
-from clrt.adaptive.replicates import HALF, REPLICATES, Grid
+from clrt.adaptive.replicates import HALVES, Grid
 from clrt.adaptive.schedule import Walk, threshold
 
 CHANCE = 0.02
@@ -19,13 +19,13 @@ def _walk(seed: int, width: int = 2, height: int = 2, error: float = 0.5) -> tup
     """A picture whose samples are 1 with a small chance, else 0, walked to an error; also how often each tile was extended."""
     generator = np.random.default_rng(seed)
     grid = Grid(width, height)
-    ledger, sums, extended = Ledger(grid), np.zeros((REPLICATES, grid.count, 8, 16, 3)), dict.fromkeys(range(grid.count), 0)
+    ledger, sums, extended = Ledger(grid, HALVES), np.zeros((HALVES, grid.count, 8, 16, 3)), dict.fromkeys(range(grid.count), 0)
 
     def take(tiles: NDArray[np.int64], samples: int, level: int) -> None:
-        inside = grid.places(tiles)[2]
-        drawn = generator.binomial(samples, CHANCE, (REPLICATES, len(tiles), 8, 16, 1)).astype(float)
+        inside = grid.inside[tiles]
+        drawn = generator.binomial(samples, CHANCE, (HALVES, len(tiles), 8, 16, 1)).astype(float)
         sums[:, tiles] += drawn * inside[None, ..., None]
-        ledger.put(tiles, level, moments(sums[:, tiles] / int(ledger.samples(level)), inside))
+        ledger.put(tiles, level, moments(sums[:, tiles] / int(ledger.samples(level)), inside, grid.sides))
 
     def extend(tiles: NDArray[np.int64]) -> bool:
         for tile in tiles.tolist():
@@ -36,7 +36,7 @@ def _walk(seed: int, width: int = 2, height: int = 2, error: float = 0.5) -> tup
 
     take(np.arange(grid.count), 1, 0)
     walk = Walk(ledger, MOST)
-    walk.run(extend, lambda half: ledger.half_error(half, walk.levels[half]).value <= error and ledger.noise[0][half].sum() > 0.0)
+    walk.run(extend, lambda side: ledger.side_error(side, walk.levels[side]).value <= error and ledger.noise[0][side].sum() > 0.0)
     return walk, ledger, extended
 
 
@@ -65,34 +65,34 @@ def test_stated_error_is_unbiased_too(trials: list[tuple[Walk, Ledger]]) -> None
 
 def test_tiles_end_at_or_below_the_threshold_and_one_level_before_above_it() -> None:
     walk, ledger, extended = _walk(3, 64, 24, 0.1)
-    for half in (0, 1):
-        levels = walk.levels[half]
+    for side in (0, 1):
+        levels = walk.levels[side]
         step = walk.step
         full = 2 * ledger.samples(levels) > MOST
-        assert ((ledger.priority(half, levels) <= threshold(step)) | full).all()
+        assert ((ledger.priority(side, levels) <= threshold(step)) | full).all()
     assert (ledger.reached == walk.levels.max(axis=0)).all()
     assert [extended[tile] for tile in range(ledger.grid.count)] == ledger.reached.tolist()  # each level was sampled once
 
 
 def test_tile_without_noise_is_left_at_its_first_level() -> None:
     grid = Grid(96, 24)
-    ledger = Ledger(grid)
+    ledger = Ledger(grid, HALVES)
     generator, everywhere = np.random.default_rng(1), np.arange(grid.count)
     noisy = everywhere % grid.columns >= 4
 
     def values(tiles: NDArray[np.int64], level: int) -> NDArray[np.float64]:
         spread = np.where(noisy[tiles], 0.5 / np.sqrt(ledger.samples(level)), 0.0)[None, :, None, None, None]
-        return 1.0 + spread * generator.normal(size=(REPLICATES, len(tiles), 8, 16, 3))
+        return 1.0 + spread * generator.normal(size=(HALVES, len(tiles), 8, 16, 3))
 
     def extend(tiles: NDArray[np.int64]) -> bool:
         for tile in tiles.tolist():
             level = int(ledger.reached[tile]) + 1
-            ledger.put(np.array([tile]), level, moments(values(np.array([tile]), level), np.ones((1, 8, 16), bool)))
+            ledger.put(np.array([tile]), level, moments(values(np.array([tile]), level), np.ones((1, 8, 16), bool), grid.sides))
         return True
 
-    ledger.put(everywhere, 0, moments(values(everywhere, 0), np.ones((grid.count, 8, 16), bool)))
+    ledger.put(everywhere, 0, moments(values(everywhere, 0), np.ones((grid.count, 8, 16), bool), grid.sides))
     walk = Walk(ledger, 1 << 12)
-    assert walk.run(extend, lambda half: ledger.half_error(half, walk.levels[half]).high <= 0.02)
+    assert walk.run(extend, lambda side: ledger.side_error(side, walk.levels[side]).high <= 0.02)
     far = everywhere % grid.columns < 3  # not even beside noise
     assert (ledger.reached[far] == 0).all()
     assert (ledger.reached[noisy] > 3).all()
@@ -100,10 +100,25 @@ def test_tile_without_noise_is_left_at_its_first_level() -> None:
 
 def test_partial_tiles_at_the_edge_cover_the_picture_once() -> None:
     grid = Grid(37, 13)
+    numbers = np.arange(13 * 37 * 3).reshape(13, 37, 3)
+    assert (grid.picture(grid.tilewise(numbers)) == numbers).all()
     seen = np.zeros((13, 37), int)
-    rows, columns, inside = grid.places(np.arange(grid.count))
-    rows, columns = np.broadcast_arrays(rows, columns)
-    np.add.at(seen, (rows[inside], columns[inside]), 1)
+    for tile, (column, row) in enumerate(grid.corners(np.arange(grid.count)).tolist()):
+        y, x = np.nonzero(grid.inside[tile])
+        np.add.at(seen, (row + y, column + x), 1)
     assert (seen == 1).all()
     assert grid.pixels.sum() == 37 * 13
-    assert HALF * 2 == REPLICATES
+
+
+def test_sides_are_a_checkerboard_over_the_whole_picture() -> None:
+    grid = Grid(37, 13)
+    odd = grid.picture(np.broadcast_to(grid.sides[1], grid.inside.shape))
+    y, x = np.indices((13, 37))
+    assert (odd == (x + y) % 2).all()
+    assert grid.side_pixels.sum(1).tolist() == [int(((x + y) % 2 == 0).sum()), int(((x + y) % 2 == 1).sum())]
+
+
+def test_picture_of_one_pixel_decides_for_itself() -> None:
+    walk, ledger, _ = _walk(1, 1, 1, 0.1)
+    assert (walk.swapped == walk.levels[0]).all()
+    assert ledger.picture(walk.swapped)[0].shape == (1, 1, 3)

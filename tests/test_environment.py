@@ -333,7 +333,7 @@ def test_picture_does_not_depend_on_launches(device: Device) -> None:
     prepared = renderer.build_trees(scene, "sah", quiet)
     tracer = renderer.open_tracer(prepared, Features.of(scene), rung("watertight"), device, quiet)[1]
     for sample in range(3):
-        tracer.begin_sample(sample)
+        tracer.begin_samples(sample, sample + 1)
         for first, end in ((24, 32), (0, 8), (8, 24)):
             tracer.run(first, end)
     assert (tracer.picture() == whole).all()

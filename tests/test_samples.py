@@ -75,7 +75,7 @@ def test_picture_does_not_depend_on_launches(device: Device) -> None:
     whole = clrt.render(scene, seed=11).pixels
     tracer = _tracer(scene, device)
     for sample in range(4):
-        tracer.begin_sample(sample)
+        tracer.begin_samples(sample, sample + 1)
         for first, end in ((24, 37), (0, 8), (8, 24)):
             tracer.run(first, end)
     assert (tracer.picture() == whole).all()

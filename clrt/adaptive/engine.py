@@ -13,7 +13,7 @@ from clrt.adaptive.intervals import Interval
 from clrt.adaptive.ledger import Ledger
 from clrt.adaptive.moments import flat, moments
 from clrt.adaptive.predict import Forecast, Outlook, as_told
-from clrt.adaptive.replicates import REPLICATES, Replicates
+from clrt.adaptive.replicates import Replicates
 from clrt.adaptive.schedule import Walk
 
 IntArray = NDArray[np.int64]
@@ -25,6 +25,7 @@ MOST_SAMPLES = 1 << 20  #: of a pixel
 _CHUNK_S = 0.1  #: launches are to take about this long, so that Ctrl-C and progress come between them
 _FIRST_TILES = 32  #: in the first launch, whose speed is not known yet
 _READ_TILES = 64  #: looked at in one go: their numbers fit a processor's cache
+PILOT_SAMPLES = 2  #: of a pixel in each replicate, before anything is decided
 _FINISH_S = 2e-7  #: a pixel, to make a picture of the tiles at the end
 
 Tell = Callable[[float], None]
@@ -69,9 +70,9 @@ class Engine:
         self.grid = replicates.grid
         self.start = time.perf_counter()
         self.cost: FloatArray = np.zeros(self.grid.count)  #: seconds of one sample of a tile, all replicates
-        self.ledger = Ledger(self.grid, 1 if goal.samples is None else goal.samples // REPLICATES)
+        self.ledger = Ledger(self.grid, replicates.count, PILOT_SAMPLES if goal.samples is None else goal.samples // replicates.count)
         self.forecast: Forecast | None = None
-        self.overhead = replicates.overhead() * REPLICATES  #: seconds of the launches of one sample
+        self.overhead = replicates.overhead()  #: seconds of a launch
 
     @property
     def spent(self) -> float:
@@ -82,9 +83,9 @@ class Engine:
         everywhere = np.arange(self.grid.count)
         rest = everywhere if self.contrast is None else self._edges(everywhere, self.contrast)
         taken = self._pilot(rest)
-        if taken < REPLICATES:
+        if taken < self.replicates.count:
             return self._short(taken)
-        self.walk = Walk(self.ledger, MOST_SAMPLES // REPLICATES)
+        self.walk = Walk(self.ledger, MOST_SAMPLES // self.replicates.count)
         met = True
         if self.goal.samples is None:
             met = self.walk.run(self._extend, self._met) or self.goal.error is None
@@ -108,24 +109,24 @@ class Engine:
                 (slice(None), slice(None, -1)), (slice(None), slice(1, None)))  # fmt: skip
             differs[before] |= apart
             differs[behind] |= apart
-        rows, columns, inside = self.grid.places(tiles)
-        edge = (differs[rows, columns] & inside).any((1, 2))
-        for part in _parts(tiles[~edge], _READ_TILES):
-            rows, columns, inside = self.grid.places(part)
-            self.ledger.put(part, 0, flat(picture[rows, columns], inside))
+        edge = self.grid.tilewise(differs).any((1, 2))[tiles]
+        still, values = tiles[~edge], self.grid.tilewise(picture)
+        for part in _parts(still, _READ_TILES):
+            self.ledger.put(part, 0, flat(values[part], self.grid.inside[part], self.grid.sides))
         self.ledger.closed[tiles[~edge]] = True
         return np.asarray(tiles[edge])
 
     def _pilot(self, tiles: IntArray) -> int:
         """Level 0 of these tiles; how many replicates there was time for."""
-        for i in range(REPLICATES):
+        count = self.replicates.count
+        for i in range(count):
             if i and i * self._left() < self.spent:
                 return i
             self._pilot_replicate(tiles, i)
-            self.tell(self._fraction(0.02 * (i + 1) / REPLICATES))
+            self.tell(self._fraction(0.02 * (i + 1) / count))
         for part in _parts(tiles, _READ_TILES):
             self._look(part, 0)
-        return REPLICATES
+        return count
 
     def _pilot_replicate(self, tiles: IntArray, i: int) -> None:
         size, at = _FIRST_TILES, 0
@@ -133,45 +134,51 @@ class Engine:
             part, begin = tiles[at : at + size], time.perf_counter()
             self.replicates.run(part, 0, self.ledger.first, range(i, i + 1))
             seconds = time.perf_counter() - begin
-            self.cost[part] += max(seconds - self.overhead / REPLICATES, 0.1 * seconds) / len(part) / self.ledger.first
+            self.cost[part] += max(seconds - self.overhead, 0.1 * seconds) / len(part) / self.ledger.first
             at += len(part)
             size = max(8, min(8 * size, int(_CHUNK_S / max(seconds / len(part), 1e-9))))
 
     def _look(self, tiles: IntArray, level: int) -> None:
         """Puts what the sums of these tiles say into the ledger."""
-        inside = self.grid.places(tiles)[2]
-        samples = int(self.ledger.samples(level))
-        self.ledger.put(tiles, level, moments(self.replicates.values(tiles, samples), inside))
+        values = self.replicates.values(tiles, int(self.ledger.samples(level)))
+        self.ledger.put(tiles, level, moments(values, self.grid.inside[tiles], self.grid.sides))
 
     def _extend(self, tiles: IntArray) -> bool:
         """The next level of these tiles; False where there is no time for all."""
-        for level in np.unique(self.ledger.reached[tiles]).tolist():
-            same = tiles[self.ledger.reached[tiles] == level]
+        reached = self.ledger.reached[tiles]  # as it is now: tiles that rise to the next level do not go on with those there
+        for level in np.unique(reached).tolist():
+            same = tiles[reached == level]
             samples = int(self.ledger.samples(level))
             while same.size:
                 seconds = np.cumsum(self.cost[same]) * samples
                 part = same[: max(1, int(np.searchsorted(seconds, min(_CHUNK_S, self._left()))))]
-                if (float(self.cost[part].sum()) + self.overhead) * samples > self._left():
+                if float(self.cost[part].sum()) * samples + self.overhead > self._left():
                     return False
                 begin = time.perf_counter()
-                self.replicates.run(part, samples, 2 * samples)
+                self._run(part, samples)
                 for few in _parts(part, _READ_TILES):
                     self._look(few, level + 1)
-                self._learn(part, (time.perf_counter() - begin) / samples - self.overhead)
+                self._learn(part, (time.perf_counter() - begin - self.overhead) / samples)
                 same = same[len(part) :]
                 self.tell(self._fraction())
         return True
+
+    def _run(self, tiles: IntArray, samples: int) -> None:
+        """As many samples again as these tiles have, in launches that are not much longer than they are to be."""
+        step = max(1, min(samples, int(_CHUNK_S / max(float(self.cost[tiles].sum()), 1e-9))))
+        for first in range(samples, 2 * samples, step):
+            self.replicates.run(tiles, first, min(first + step, 2 * samples))
 
     def _learn(self, tiles: IntArray, seconds: float) -> None:
         """Halfway from what was known of the cost of these tiles to what they took together."""
         before = float(self.cost[tiles].sum())
         self.cost[tiles] *= 0.5 * (1.0 + max(seconds / before, 0.1)) if before > 0.0 else 1.0
 
-    def _met(self, half: int) -> bool:
+    def _met(self, side: int) -> bool:
         if self.forecast is None:
             self._foretell()
-        levels = self.walk.levels[half]
-        return self.goal.error is not None and self.ledger.half_error(half, levels).high <= self.goal.error
+        levels = self.walk.levels[side]
+        return self.goal.error is not None and self.ledger.side_error(side, levels).high <= self.goal.error
 
     def _foretell(self) -> None:
         """The forecast, as soon as PILOT of the whole is done."""
@@ -195,7 +202,7 @@ class Engine:
 
     def _samples(self) -> tuple[int, float, int]:
         """Of a pixel that were traced, also those that only decided."""
-        count = self.ledger.samples(self.ledger.reached) * REPLICATES
+        count = self.ledger.samples(self.ledger.reached) * self.replicates.count
         if self.contrast is not None:
             count = count + 1
             count[self.ledger.closed] = 1
@@ -204,13 +211,14 @@ class Engine:
     def _short(self, taken: int) -> Outcome:
         """No time for all replicates: the mean of those there are, with what they tell of the error."""
         values = np.stack([self.replicates.means(i, self.ledger.first) for i in range(taken)])
-        pixels = values.mean(axis=0)
+        pixels, count = values.mean(axis=0), taken * self.ledger.first
+        samples = (count, float(count), count)
         if taken == 1:
             unknown = np.full(pixels.shape, np.inf, np.float32)
-            return Outcome(pixels.astype(np.float32), unknown, Interval(np.inf, 0.0, np.inf), (1, 1.0, 1), None, self.goal.error is None)
+            return Outcome(pixels.astype(np.float32), unknown, Interval(np.inf, 0.0, np.inf), samples, None, self.goal.error is None)
         variance = values.var(axis=0, ddof=1) / taken
         value = float(np.sqrt(variance.mean()) / max(abs(float(pixels.mean())), np.finfo(float).tiny))
-        error, samples = np.sqrt(variance).astype(np.float32), (taken, float(taken), taken)
+        error = np.sqrt(variance).astype(np.float32)
         return Outcome(pixels.astype(np.float32), error, Interval(value, 0.0, np.inf), samples, None, self.goal.error is None)
 
 

@@ -1,4 +1,4 @@
-"""What the replicates of a tile say: the mean of each half, its variance, and sums over the tile that decide where to go on."""
+"""What the replicates of a tile say: each pixel's mean, its variance, and sums over the tile's two sides that decide where to go on."""
 
 from __future__ import annotations
 
@@ -7,25 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.adaptive.replicates import HALF, REPLICATES
-
 FloatArray = NDArray[np.float64]
-FreeArray = NDArray[np.floating]
-
-_FREEDOM = HALF - 1
-#: E[s^4] = sigma^4 (n + 1) / (n - 1) for n normal replicates: what a half's own squared variance is to be multiplied by
-_SQUARE = _FREEDOM / (_FREEDOM + 2)
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Of some tiles at one number of samples; the first axis is half A, half B.
+    """Of some tiles at one number of samples.
 
-    mean, variance : (2, n, th, tw, 3) float32, the half's mean and the variance of that mean
-    total, noise : (2, n) sums over pixels and channels of the mean and of its variance
-    square : (2, n) sums over pixels of the squared covariances of channels of the half's mean, from that half alone
-    product : (n,) the same as the product of both halves' covariances, unbiased
-    bad : (n,) pixels that are no finite numbers; they are in none of the sums
+    mean, variance : (n, th, tw, 3) float32, of each pixel over replicates, and the variance of that mean
+    total, noise : (2, n) sums over a side's pixels and channels of the mean and of its variance
+    square : (2, n) sums over a side's pixels of the squared covariances of channels
+    bad : (2, n) pixels that are no finite numbers; they are in none of the sums
     """
 
     mean: NDArray[np.float32]
@@ -33,34 +26,46 @@ class Moments:
     total: FloatArray
     noise: FloatArray
     square: FloatArray
-    product: FloatArray
-    bad: NDArray[np.int64]
+    bad: FloatArray
 
 
-def moments(values: FloatArray, inside: NDArray[np.bool_]) -> Moments:
-    """values : (REPLICATES, n, th, tw, 3) means of the replicates; inside : (n, th, tw) pixels that are in the picture."""
+def moments(values: FloatArray, inside: BoolArray, sides: BoolArray) -> Moments:
+    """values : (replicates, n, th, tw, 3), their means; inside : (n, th, tw) pixels that are in the picture; sides : (2, th, tw)."""
     with np.errstate(invalid="ignore", over="ignore"):
-        finite = np.isfinite(values.sum(axis=0)).all(-1)
-        halves = values.reshape(2, HALF, *values.shape[1:])
-        mean = halves.mean(axis=1)
-        spread = (halves - mean[:, None]) / np.sqrt(HALF * (HALF - 1.0))
-    good = (inside & finite)[..., None]
+        mean = values.mean(axis=0)
+        spread = values - mean
+    bright = mean.sum(-1)
+    finite = np.isfinite(bright)
+    good = inside & finite
     if not good.all():
-        spread = np.where(good, spread, 0.0)
-    covariance = [[np.einsum("hrnyx,hrnyx->hnyx", spread[..., c], spread[..., d]) for d in range(c + 1)] for c in range(3)]
-    variance = np.stack([covariance[c][c] for c in range(3)], -1)
-    square, product = np.zeros((2, values.shape[1])), np.zeros(values.shape[1])
-    for c in range(3):
-        for d in range(c + 1):
-            twice = 1.0 if c == d else 2.0
-            square += twice * np.einsum("hnyx,hnyx->hn", covariance[c][d], covariance[c][d])
-            product += twice * np.einsum("nyx,nyx->n", covariance[c][d][0], covariance[c][d][1])
-    total = np.where(good, mean, 0.0).sum(axis=(2, 3, 4))
+        bright = np.where(good, bright, 0.0)
+        spread[:, ~good] = 0.0
+    count = len(values)
+    variance = np.einsum("rnyxc,rnyxc->nyxc", spread, spread) / (count * (count - 1.0))
+    trace = variance.sum(-1)
+    square = _squares(spread / np.sqrt(count * (count - 1.0)), trace)
     with np.errstate(over="ignore"):
         kept = mean.astype(np.float32), variance.astype(np.float32)
-    return Moments(*kept, total, variance.sum(axis=(2, 3, 4)), square * _SQUARE, np.maximum(product, 0.0), (inside & ~finite).sum((1, 2)))
+    side = sides.reshape(2, -1).astype(np.float64)
+    total, noise, squares, bad = (side @ a.reshape(len(a), -1).T for a in (bright, trace, square, (inside & ~finite).astype(np.float64)))
+    return Moments(*kept, total, noise, np.maximum(squares, 0.0), bad)
 
 
-def flat(mean: FloatArray, inside: NDArray[np.bool_]) -> Moments:
-    """Tiles of which one sample a pixel, `mean`, is taken for the truth: both halves have it, without variance."""
-    return moments(np.broadcast_to(mean, (REPLICATES, *mean.shape)), inside)
+def _squares(spread: FloatArray, trace: FloatArray) -> FloatArray:
+    """(n, th, tw): the trace of the square of the true covariance of a pixel's channels, for normal replicates.
+
+    With W the estimate from n degrees of freedom (Wishart 1928), tr W^2 has the mean (1 + 1/n) tr S^2 + (tr S)^2 / n and (tr W)^2 has
+    (tr S)^2 + 2/n tr S^2. One degree cannot tell the two apart; then channels are taken to be noisy together, as they mostly are, which
+    is at most 5/3 too much.
+    """
+    freedom = len(spread) - 1
+    if freedom == 1:
+        return np.asarray(trace * trace / 3.0)
+    cross = np.einsum("rnyxc,rnyxd->nyxcd", spread, spread)
+    own = np.einsum("nyxcd,nyxcd->nyx", cross, cross)
+    return np.asarray((own - trace * trace / freedom) / (1.0 + 1.0 / freedom - 2.0 / freedom**2))
+
+
+def flat(mean: FloatArray, inside: BoolArray, sides: BoolArray) -> Moments:
+    """Tiles of which one sample a pixel, `mean`, is taken for the truth: without variance."""
+    return moments(np.stack([mean, mean]), inside, sides)

@@ -33,8 +33,8 @@ class Forecast:
 
 @dataclass(frozen=True)
 class Outlook:
-    """The state from which a render goes on. cost : (tiles,) seconds of one sample of all replicates, and `overhead` those of its
-    launches, whatever the tiles; spent : seconds so far.
+    """The state from which a render goes on. cost : (tiles,) seconds of one sample of all replicates, and `overhead` those of a
+    launch, whatever it traces; spent : seconds so far.
     """
 
     ledger: Ledger
@@ -49,7 +49,7 @@ class Outlook:
         runs = [self._run(slopes + shift * doubt, pace, error, seconds)
                 for shift, pace in ((0.0, 1.0), (1.0, 1.0 - _PACE), (-1.0, 1.0 + _PACE))]  # fmt: skip
         (time, reached), (quick, better), (slow, worse) = runs
-        now = self.ledger.half_error(0, self.walk.levels[0])
+        now = self.ledger.side_error(0, self.walk.levels[0])
         spread = (now.high / now.value, now.low / now.value) if now.value > 0.0 and now.high < np.inf else (1.0, 1.0)
         return Forecast(Interval(time, min(quick, time), max(slow, time)),
                         Interval(reached, min(better, reached) * spread[1], max(worse, reached) * spread[0]))  # fmt: skip
@@ -59,20 +59,20 @@ class Outlook:
         ledger, reached = self.ledger, self.ledger.reached
         own = np.full(ledger.grid.count, np.nan)
         pooled = _USUAL
-        halves = []
+        apart = []
         for level in range(1, len(ledger.noise)):
             tiles = np.flatnonzero(reached >= level)
             before, after = ledger.noise[level - 1][:, tiles], ledger.noise[level][:, tiles]
             sums = before.sum(1), after.sum(1)
             if tiles.size == 0 or min(sums[0].min(), sums[1].min()) <= 0.0:
                 continue
-            halves = np.log2(sums[0] / sums[1]).tolist()
+            apart = np.log2(sums[0] / sums[1]).tolist()
             pooled = float(np.log2(sums[0].sum() / sums[1].sum()))
             with np.errstate(divide="ignore", invalid="ignore"):
                 slope = np.log2(before.sum(0) / after.sum(0))
             own[tiles] = np.where(np.isfinite(slope), slope, np.nan)
         mixed = np.where(np.isnan(own), pooled, 0.5 * (own + pooled))
-        doubt = _SLOPE + (abs(halves[0] - halves[1]) / 2.0 if halves else 0.3)
+        doubt = _SLOPE + (abs(apart[0] - apart[1]) / 2.0 if apart else 0.3)
         return np.broadcast_to(np.clip(mixed, *_SLOPES), (2, len(mixed))), doubt
 
     def _run(self, slopes: FloatArray, pace: float, error: float | None, seconds: float | None) -> tuple[float, float]:
@@ -80,14 +80,14 @@ class Outlook:
         ledger, walk = self.ledger, self.walk
         slopes = np.clip(slopes, *_SLOPES)
         noise, levels = ledger.at(ledger.noise, walk.levels).copy(), walk.levels.copy()
-        numbers = max(1, 3 * int((ledger.grid.pixels - ledger.bad).sum()))
-        scale = numbers * max(abs(float(ledger.at(ledger.total, walk.levels).sum())) / 2.0 / numbers, np.finfo(float).tiny) ** 2
-        now = ledger.half_error(0, walk.levels[0])
+        numbers = float(ledger.numbers().sum())
+        scale = numbers * max(abs(float(ledger.at(ledger.total, walk.levels).sum())) / numbers, np.finfo(float).tiny) ** 2
+        now = ledger.side_error(0, walk.levels[0])
         margin = now.high / now.value if now.value > 0.0 and now.high < np.inf else 1.0
         there, time = ledger.reached.copy(), self.spent
-        size = ledger.grid.pixels * 3.0
+        size = np.maximum(ledger.pixels, 1) * 3.0
         most = np.where(ledger.closed, 0, walk.most)
-        best = (time, float(np.sqrt(noise.sum() / 4.0 / scale)))
+        best = (time, float(np.sqrt(noise.sum() / scale)))
         for step in range(walk.step + 1, walk.step + 1 + _MOST_STEPS):
             if error is not None and best[1] * margin <= error:
                 break
@@ -97,9 +97,9 @@ class Outlook:
                 noise = np.where(up, noise * 2.0 ** -(_LAST + (slopes - _LAST) * _FADE**ahead), noise)
             higher = np.maximum(there, levels.max(0))
             rising = [int(ledger.samples(level)) for level in range(int(higher.max())) if ((there <= level) & (higher > level)).any()]
-            time += pace * (float(np.sum(self.cost * (ledger.samples(higher) - ledger.samples(there)))) + self.overhead * sum(rising))
+            time += pace * (float(np.sum(self.cost * (ledger.samples(higher) - ledger.samples(there)))) + self.overhead * len(rising))
             there = higher
-            reached = float(np.sqrt(noise.sum() / 4.0 / scale))
+            reached = float(np.sqrt(noise.sum() / scale))
             if seconds is not None and time > seconds:
                 share = (seconds - best[0]) / max(time - best[0], 1e-12)
                 return max(seconds, self.spent), best[1] + (reached - best[1]) * min(max(share, 0.0), 1.0)

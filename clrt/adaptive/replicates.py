@@ -14,8 +14,8 @@ from clrt.device.program import TILE
 from clrt.device.session import FILM_BYTES, Tracer
 from clrt.errors import LimitError
 
-REPLICATES = 8  #: independent sequences of samples; why not fewer: docs/error.md
-HALF = REPLICATES // 2  #: the first so many are half A, the others half B
+HALVES = 2  #: independent sequences of samples, the fewest that tell an error: long ones gain the most from their order (docs/error.md)
+MAP_REPLICATES = 8  #: where the error of each pixel is asked for, which two can hardly tell
 _SUM_BYTES = 2 * FILM_BYTES
 _GOLDEN = 0x9E3779B97F4A7C15
 
@@ -23,7 +23,7 @@ IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
 
 
-def replicate_seeds(seed: int, count: int = REPLICATES) -> list[int]:
+def replicate_seeds(seed: int, count: int = HALVES) -> list[int]:
     """The seeds of the replicates, 0 to 2^32 - 1: words of SplitMix64 (Steele, Lea and Flood 2014) that starts from the scene's seed."""
     return [_mix64((seed * 0x100000001B3 + (i + 1) * _GOLDEN) & (2**64 - 1)) >> 32 for i in range(count)]
 
@@ -35,109 +35,112 @@ def _mix64(x: int) -> int:
 
 
 class Grid:
-    """The tiles of a picture, numbered row by row. count : of tiles; pixels : (count,) pixels of each that are in the picture."""
+    """The tiles of a picture, numbered row by row.
+
+    count : of tiles; inside : (count, th, tw) which pixels are not beside the picture; sides : (2, th, tw) the pixels of each side of a
+    tile, whose row + column is even and odd: as alike as two sets of pixels can be, and without a common random number.
+    """
 
     def __init__(self, width: int, height: int) -> None:
         self.width, self.height = width, height
         self.columns, self.rows = -(-width // TILE[0]), -(-height // TILE[1])
         self.count = self.columns * self.rows
-        across = np.minimum(TILE[0], width - TILE[0] * np.arange(self.columns))
-        down = np.minimum(TILE[1], height - TILE[1] * np.arange(self.rows))
-        self.pixels: IntArray = np.outer(down, across).ravel().astype(np.int64)
+        self.inside = self.tilewise(np.ones((height, width), bool))
+        odd = (np.add.outer(np.arange(TILE[1]), np.arange(TILE[0])) & 1).astype(bool)
+        self.sides: NDArray[np.bool_] = np.stack([~odd, odd])
+        self.pixels: IntArray = self.inside.sum((1, 2))  #: (count,) of each tile
+        self.side_pixels: IntArray = np.einsum("nyx,syx->sn", self.inside.astype(np.int64), self.sides.astype(np.int64))  #: (2, count)
 
     def corners(self, tiles: IntArray) -> NDArray[np.int32]:
         """(n, 2): column and row of the first pixel of each."""
         return np.stack([tiles % self.columns * TILE[0], tiles // self.columns * TILE[1]], 1).astype(np.int32)
 
-    def places(self, tiles: IntArray) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.bool_]]:
-        """Indices (n, th, 1) of rows and (n, 1, tw) of columns, kept inside the picture, and (n, th, tw): which are not beside it."""
-        corner = self.corners(tiles)
-        rows, columns = corner[:, 1:] + np.arange(TILE[1]), corner[:, :1] + np.arange(TILE[0])
-        inside = (rows < self.height)[:, :, None] & (columns < self.width)[:, None, :]
-        return np.minimum(rows, self.height - 1)[:, :, None], np.minimum(columns, self.width - 1)[:, None, :], inside
+    def tilewise(self, picture: NDArray[Any]) -> NDArray[Any]:
+        """(count, th, tw, ...) of a picture (height, width, ...); zero beside it."""
+        beside = (self.rows * TILE[1] - self.height, self.columns * TILE[0] - self.width)
+        padded = np.pad(picture, [(0, beside[0]), (0, beside[1]), *[(0, 0)] * (picture.ndim - 2)])
+        cut = padded.reshape(self.rows, TILE[1], self.columns, TILE[0], *picture.shape[2:])
+        return np.ascontiguousarray(cut.swapaxes(1, 2)).reshape(self.count, TILE[1], TILE[0], *picture.shape[2:])
+
+    def picture(self, tiles: NDArray[Any]) -> NDArray[Any]:
+        """(height, width, ...) of all tiles (count, th, tw, ...)."""
+        cut = tiles.reshape(self.rows, self.columns, TILE[1], TILE[0], *tiles.shape[3:]).swapaxes(1, 2)
+        return np.ascontiguousarray(cut.reshape(self.rows * TILE[1], self.columns * TILE[0], *tiles.shape[3:])[: self.height, : self.width])
 
 
 class Replicates:
     """The sums of all replicates, each of the same number of samples in a tile. `tracer` renders a scene with the feature "sampling"."""
 
-    def __init__(self, tracer: Tracer, seed: int | None = None) -> None:
+    def __init__(self, tracer: Tracer, count: int = HALVES, seed: int | None = None) -> None:
         """seed : instead of the scene's own. Raises LimitError where the device has no room for the sums."""
         buffers = tracer.buffers
-        self.tracer, self.queue = tracer, buffers.device.queue
+        self.tracer, self.queue, self.count = tracer, buffers.device.queue, count
         self.grid = Grid(tracer.width, tracer.height)
-        size, there = tracer.width * tracer.height * _SUM_BYTES, buffers.device.handle.global_mem_size
-        if size * REPLICATES > there // 2:
+        size, there = count * self.grid.count * TILE[0] * TILE[1] * _SUM_BYTES, buffers.device.handle.global_mem_size
+        if size > min(there // 2, buffers.device.handle.max_mem_alloc_size):
             raise LimitError(
-                f"{REPLICATES} replicates of {tracer.width} x {tracer.height} need {size * REPLICATES >> 20:,} MiB on the device, which "
+                f"{count} replicates of {tracer.width} x {tracer.height} need {size >> 20:,} MiB on the device, which "
                 f"has {there >> 20:,} MiB; take a smaller picture, or --samples without --stderr"
             )
-        self.sums = [buffers.empty(size) for _ in range(REPLICATES)]
-        self.frames = [self._frame(word) for word in replicate_seeds(buffers.packed.scene.seed if seed is None else seed)]
-        self.launches: list[tuple[IntArray, int, int, int]] = []  #: tiles, first and last but one sample, replicate
+        self.sums = buffers.empty(size)
+        self.frame = buffers.frame
+        words = replicate_seeds(buffers.packed.scene.seed if seed is None else seed, count)
+        self.seeds = np.array(words, np.uint32).astype(np.int32)
+        self.launches: list[tuple[IntArray, int, int, range]] = []  #: tiles, first and last but one sample, replicates
 
-    def _frame(self, seed: int) -> Any:
-        record = self.tracer.buffers.packed.frame.copy()
-        record["seed"] = np.uint32(seed).astype(np.int32)
-        return self.tracer.buffers.upload(record)
-
-    def run(self, tiles: IntArray, first: int, end: int, replicates: range = range(REPLICATES)) -> None:
-        """Adds samples [first, end) to the sums of these tiles, which hold those before; waits for them."""
-        corners = self.grid.corners(tiles).ravel()
-        for sample in range(first, end):
-            given = self.tracer.buffers.upload(np.concatenate([np.array([sample, sample, len(tiles)], np.int32), corners]))
-            for i in replicates:
-                self.tracer.run_tiles(self.frames[i], {"sample_range": given, "sample_sums": self.sums[i]}, len(tiles))
-        self.queue.finish()
-        self.launches += [(tiles, first, end, i) for i in replicates]
+    def run(self, tiles: IntArray, first: int, end: int, replicates: range | None = None) -> None:
+        """Adds samples [first, end) to the sums of these tiles, which hold those before; waits for them. None: of all replicates."""
+        replicates = range(self.count) if replicates is None else replicates
+        given = np.empty((len(tiles), len(replicates), 4), np.int32)
+        given[:, :, :2] = self.grid.corners(tiles)[:, None]
+        given[:, :, 2] = self.seeds[replicates.start : replicates.stop]
+        given[:, :, 3] = tiles[:, None] + self.grid.count * np.arange(replicates.start, replicates.stop)
+        self.tracer.run_tiles(self.frame, self.sums, (first, end), given.reshape(-1, 4))
+        self.launches.append((tiles, first, end, replicates))
 
     def centre(self, tiles: IntArray) -> None:
         """One sample through the centre of each pixel of these tiles, in the sums of replicate 0; what is sampled next replaces it."""
         record = self.tracer.buffers.packed.frame.copy()
         record["pixel_spread"] = 0
-        kept, self.frames[0] = self.frames[0], self.tracer.buffers.upload(record)
+        self.frame = self.tracer.buffers.upload(record)
         self.run(tiles, 0, 1, range(1))
-        self.frames[0] = kept
+        self.frame = self.tracer.buffers.frame
 
     def overhead(self) -> float:
         """Seconds that a launch takes whatever it traces: that of a tile beside the picture, the least of a few."""
-        beside = self.tracer.buffers.upload(np.array([0, 0, 1, self.grid.width, self.grid.height], np.int32))
+        beside = np.array([[self.grid.width, self.grid.height, 0, 0]], np.int32)
         seconds = []
         for _ in range(8):
             begin = time.perf_counter()
-            self.tracer.run_tiles(self.frames[0], {"sample_range": beside, "sample_sums": self.sums[0]}, 1)
-            self.queue.finish()
+            self.tracer.run_tiles(self.frame, self.sums, (0, 1), beside)
             seconds.append(time.perf_counter() - begin)
         return min(seconds)
 
     def values(self, tiles: IntArray, samples: int) -> FloatArray:
-        """(REPLICATES, n, th, tw, 3): means over `samples` samples; numbers beside the picture are those at its edge."""
-        rows, columns, _ = self.grid.places(tiles)
-        values = np.empty((REPLICATES, len(tiles), *TILE[::-1], 3))
-        for i in range(REPLICATES):
-            with self._mapped(i) as sums:
-                np.divide(sums[rows, columns], samples, out=values[i])
-        return values
+        """(count, n, th, tw, 3): means over `samples` samples; what is beside the picture is nothing in particular."""
+        with self._mapped() as sums:
+            return np.asarray(sums[:, tiles] / samples)
 
     def means(self, replicate: int, samples: int) -> FloatArray:
         """(h, w, 3) of one replicate over `samples` samples."""
-        with self._mapped(replicate) as sums:
-            return np.asarray(sums / samples)
+        with self._mapped() as sums:
+            return self.grid.picture(sums[replicate] / samples)
 
     @contextmanager
-    def _mapped(self, replicate: int) -> Iterator[FloatArray]:
+    def _mapped(self) -> Iterator[FloatArray]:
         import pyopencl as cl
 
-        shape = (self.grid.height, self.grid.width, 3)
+        shape = (self.count, self.grid.count, TILE[1], TILE[0], 3)
         kind: Any = np.float64
-        sums: Any = cl.enqueue_map_buffer(self.queue, self.sums[replicate], cl.map_flags.READ, 0, shape, kind)[0]
+        sums: Any = cl.enqueue_map_buffer(self.queue, self.sums, cl.map_flags.READ, 0, shape, kind)[0]
         try:
             yield sums
         finally:
             sums.base.release(self.queue)
 
-    def replay(self, launches: Iterable[tuple[IntArray, int, int, int]]) -> None:
+    def replay(self, launches: Iterable[tuple[IntArray, int, int, range]]) -> None:
         """The same launches by this tracer, which is one that counts: adds to its counts."""
         self.tracer.begin_counting()
-        for tiles, first, end, i in launches:
-            self.run(tiles, first, end, range(i, i + 1))
+        for tiles, first, end, replicates in launches:
+            self.run(tiles, first, end, replicates)
         self.tracer.end_counting()

@@ -10,7 +10,7 @@ from typing import Any
 
 from clrt.adaptive.engine import Engine, Goal, Outcome
 from clrt.adaptive.predict import Forecast
-from clrt.adaptive.replicates import REPLICATES, Replicates
+from clrt.adaptive.replicates import HALVES, MAP_REPLICATES, Replicates
 from clrt.device.session import Tracer
 from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
@@ -26,14 +26,14 @@ Foretell = Callable[[Forecast], None]
 
 @dataclass(frozen=True)
 class Request:
-    """error, within : as asked for, None where not; split : samples as given, in replicates, so that their error is known.
+    """error, within : as asked for, None where not; pixels : the error of each pixel is asked for.
 
     deadline : time.perf_counter() at which `within` ends
     """
 
     error: float | None = None
     within: float | None = None
-    split: bool = False
+    pixels: bool = False
     deadline: float | None = None
 
     @classmethod
@@ -48,10 +48,20 @@ class Request:
             raise ClrtError("samples are chosen by error and within; give either these, or a number of samples")
         if deadline is None and within is not None:
             deadline = time.perf_counter() + within
-        return cls(error, within, standard_error and not adaptive, deadline)
+        return cls(error, within, standard_error, deadline)
 
     def __bool__(self) -> bool:
-        return self.error is not None or self.within is not None or self.split
+        return self.error is not None or self.within is not None or self.pixels
+
+    @property
+    def split(self) -> bool:
+        """Samples as given, in replicates, so that their error is known."""
+        return self.pixels and self.error is None and self.within is None
+
+    @property
+    def replicates(self) -> int:
+        """How many the picture is made of."""
+        return MAP_REPLICATES if self.pixels else HALVES
 
     def samples(self, given: int | None) -> int | None:
         """For the scene: more than one where accuracy is asked for, so that places in the pixel are drawn."""
@@ -61,10 +71,11 @@ class Request:
         """Raises ClrtError where `samples`, those of the scene, cannot be split."""
         if not self.split:
             return Goal(self.error, self.deadline)
-        if samples % REPLICATES:
-            near = max(1, round(samples / REPLICATES)) * REPLICATES
+        count = self.replicates
+        if samples % count:
+            near = max(1, round(samples / count)) * count
             raise ClrtError(
-                f"a standard error needs samples that can be split over {REPLICATES} sequences; {samples} cannot; "
+                f"a standard error needs samples that can be split over {count} sequences; {samples} cannot; "
                 f"take {near} samples, or error or within"
             )
         return Goal(samples=samples)
@@ -90,7 +101,7 @@ def sample(
         return None, None
     buffers = tracer.buffers
     goal = request.goal(buffers.packed.scene.samples)
-    replicates = Replicates(tracer)
+    replicates = Replicates(tracer, request.replicates)
     engine = Engine(replicates, goal, tell, foretell or (lambda told: None), request.contrast(buffers.features))
     return engine.run(), replicates
 

@@ -77,8 +77,8 @@ def _media(packed: Packed) -> NDArray[np.int32]:
 
 
 def _sample_range(packed: Packed) -> NDArray[np.int32]:
-    """Number of the next sample, how many are in the sums, and no tiles: see sampling.cl."""
-    return np.zeros(3, np.int32)
+    """The first sample, the one behind the last, and no tiles: see sampling.cl."""
+    return np.array([0, 1, 0], np.int32)
 
 
 def _sample_sums(packed: Packed) -> NDArray[np.float64]:

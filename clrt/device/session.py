@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,9 @@ from clrt.device.packed import Packed
 from clrt.errors import LimitError
 from clrt.features import Features
 from clrt.precision import Precision
+from clrt.scene.model import Scene
 
-_PREPARE_LOCAL = 64
+PREPARE_LOCAL = 64
 FILM_BYTES = 12  #: a pixel of the film: three float32
 
 
@@ -37,6 +37,13 @@ def check_picture(device: Device, width: int, height: int) -> None:
         )
 
 
+def shares_lights(scene: Scene, precision: Precision, device: Device, slots: int | None = None) -> bool:
+    """Whether edge planes of every light, of so many slots (default: of all triangles), fit in the device's memory."""
+    count = scene.triangle_count if slots is None else slots
+    size = max(1, count) * layout.edge_planes(precision.real).itemsize * len(scene.lights_with_position)
+    return size <= min(device.handle.max_mem_alloc_size, device.handle.global_mem_size // 4)
+
+
 class Buffers:
     """The device's copy of a packed scene. `shared_lights`: whether edge planes of every light fit in memory."""
 
@@ -44,7 +51,7 @@ class Buffers:
         self.device, self.packed, self.features, self.precision = device, packed, features, precision
         self.plane_bytes = max(1, packed.slots) * layout.edge_planes(precision.real).itemsize
         lights = len(packed.scene.lights_with_position)
-        self.shared_lights = self.plane_bytes * lights <= min(device.handle.max_mem_alloc_size, device.handle.global_mem_size // 4)
+        self.shared_lights = shares_lights(packed.scene, precision, device, packed.slots)
         self._check_memory()
         self.frame = self.upload(packed.frame)
         self.vertices = self.upload(packed.vertices)
@@ -90,20 +97,20 @@ class Buffers:
         packed, queue, count = self.packed, self.device.queue, np.int32(self.packed.slots)
         if not packed.slots:
             return
-        size = (-(-packed.slots // _PREPARE_LOCAL) * _PREPARE_LOCAL,)
+        size = (-(-packed.slots // PREPARE_LOCAL) * PREPARE_LOCAL,)
         with kernel_cache.loading():
             kernel = cl.Kernel(built, "prepare_triangles")
             for origin, first, end in packed.runs:
-                part = (-(-(end - first) // _PREPARE_LOCAL) * _PREPARE_LOCAL,)
+                part = (-(-(end - first) // PREPARE_LOCAL) * PREPARE_LOCAL,)
                 kernel(
-                    queue, part, (_PREPARE_LOCAL,), self.vertices, _double4(origin), self.triangles, np.int32(end), global_offset=(first,)
+                    queue, part, (PREPARE_LOCAL,), self.vertices, _double4(origin), self.triangles, np.int32(end), global_offset=(first,)
                 )
             if planes:
                 self._prepare_planes(cl.Kernel(built, "prepare_planes"), size, count)
             queue.finish()
 
     def _prepare_planes(self, kernel: Any, size: tuple[int], count: np.int32) -> None:
-        packed, queue, local = self.packed, self.device.queue, (_PREPARE_LOCAL,)
+        packed, queue, local = self.packed, self.device.queue, (PREPARE_LOCAL,)
         kernel(queue, size, local, self.vertices, _double4(packed.scene.camera.eye), self.eye_planes, np.int32(0), count)
         if "light_planes" in self.effects and self.shared_lights:
             for i, light in enumerate(packed.scene.lights_with_position):
@@ -167,21 +174,28 @@ class Tracer:
         if self.stages is not None:
             self._after += (self.stages.buffer,)
 
-    def begin_sample(self, sample: int) -> None:
-        """The next rows are those of this sample, which is added to the ones before it. For scenes that are sampled."""
+    def begin_samples(self, first: int, end: int) -> None:
+        """The next rows are those of samples [first, end), which are added to the ones before them. For scenes that are sampled."""
         import pyopencl as cl
 
-        cl.enqueue_copy(self.buffers.device.queue, self.buffers.effects["sample_range"], np.array([sample, sample, 0], np.int32))
+        cl.enqueue_copy(self.buffers.device.queue, self.buffers.effects["sample_range"], np.array([first, end, 0], np.int32))
 
-    def run_tiles(self, frame: Any, effects: Mapping[str, Any], tiles: int) -> None:
-        """Enqueues one sample of tiles, without waiting; `frame` and `effects` (name -> buffer) are taken in place of the tracer's own."""
+    def run_tiles(self, frame: Any, sums: Any, samples: tuple[int, int], tiles: NDArray[np.int32]) -> None:
+        """Adds samples [first, end) of tiles to `sums`, and waits for them; `frame` is taken in place of the tracer's own.
+
+        sums : buffer of float64, tile by tile, each (TILE height, width, 3); tiles : (n, 4) column and row of the first pixel, seed, and the
+            place of the sums, in tiles
+        """
         packet_width, packet_height = program.PACKETS[self.lanes]
-        packets = tiles * (program.TILE[0] // packet_width) * (program.TILE[1] // packet_height)
-        size = program.LOCAL_SIZE[0], _multiple(-(-packets // program.LOCAL_SIZE[0]), program.LOCAL_SIZE[1])
+        packets = len(tiles) * (program.TILE[0] // packet_width) * (program.TILE[1] // packet_height)
+        size = program.LOCAL_SIZE[0], multiple(-(-packets // program.LOCAL_SIZE[0]), program.LOCAL_SIZE[1])
+        given = self.buffers.upload(np.concatenate([np.array([*samples, len(tiles)], np.int32), tiles.ravel()]))
+        effects = {"sample_range": given, "sample_sums": sums}
         after = (self.film, *(effects.get(name, own) for name, own in zip(self._effects, self._after[1:], strict=False)))
         rows = np.int32(0), np.int32(self.height)
         queue = self.buffers.device.queue
         self.kernel(queue, size, program.LOCAL_SIZE, frame, *self._before[1:], *rows, *after, *self._after[len(after) :])
+        queue.finish()
 
     def warm_up(self) -> None:
         """Launches over no rows: PoCL compiles for a local size at its first launch, which belongs to compiling."""
@@ -191,8 +205,8 @@ class Tracer:
     def run(self, first_row: int, end_row: int) -> None:
         """Renders rows [first_row, end_row) and waits for them. In the counting build, adds to `counts`."""
         packet_width, packet_height = program.PACKETS[self.lanes]
-        columns = _multiple(-(-self.width // packet_width), program.LOCAL_SIZE[0])
-        rows = _multiple(max(1, -(-(end_row - first_row) // packet_height)), program.LOCAL_SIZE[1])
+        columns = multiple(-(-self.width // packet_width), program.LOCAL_SIZE[0])
+        rows = multiple(max(1, -(-(end_row - first_row) // packet_height)), program.LOCAL_SIZE[1])
         queue = self.buffers.device.queue
         if self.counting:
             self.begin_counting()
@@ -224,5 +238,6 @@ class Tracer:
         return pixels
 
 
-def _multiple(value: int, of: int) -> int:
+def multiple(value: int, of: int) -> int:
+    """The least multiple of `of` that is not below `value`."""
     return -(-value // of) * of
