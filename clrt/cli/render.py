@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +14,10 @@ from clrt.cli import arguments as kinds
 from clrt.cli import clock, failure, paths, streams
 from clrt.cli.progress import PhaseProgress
 from clrt.errors import ClrtError
+from clrt.tasks import Task
 
 if TYPE_CHECKING:
+    from clrt.device.context import Device
     from clrt.image.image import Image
     from clrt.scene.model import Scene
 
@@ -44,6 +47,7 @@ class Options:
     error: float | None
     within: float | None
     stderr: Path | None
+    cache: bool
 
 
 #: what follows a render: seconds to print figures and to end, and seconds a pixel to write a picture, and as many for a second one
@@ -83,6 +87,7 @@ _AFTER_S, _AFTER_PIXEL_S = 0.2, 6e-8
 )
 @click.option("--within", type=kinds.duration, metavar="T", help="The best picture in this time, such as 5s or 2min, compiling included.")
 @click.option("--stderr", type=kinds.file, metavar="FILE", help="Write a map of each pixel's standard error, too: .png or .exr.")
+@click.option("--no-cache", "cache", flag_value=False, default=True, help="Neither keep trees and compiled kernels nor take kept ones.")
 @click.option("-q", "--quiet", is_flag=True, help="Print no figures and no progress.")
 def render(**arguments: Any) -> None:
     """Render SCENE to a picture. The same as `clrt SCENE`."""
@@ -91,9 +96,10 @@ def render(**arguments: Any) -> None:
     scene_path = _scene_path(options)
     picture = options.out or Path(scene_path.stem + ".png")
     _check(options, scene_path, picture)
+    opening = _open_device(options)
     with PhaseProgress(quiet=options.quiet) as progress:
         scene, read_s = _read(options, scene_path, progress)
-        image = _render(options, scene, progress, start)
+        image = _render(options, scene, progress, start, opening)
         write_s = _write(options, image, picture, progress)
     stats = image.stats
     if stats is None:
@@ -140,6 +146,15 @@ def _check(options: Options, scene_path: Path, picture: Path) -> None:
     effect_names(options.without)
 
 
+def _open_device(options: Options) -> Task[Device]:
+    """The device, which another thread opens while the scene is read."""
+    from clrt.device import context, kernel_cache
+
+    if not options.cache:
+        kernel_cache.use_temporary_folder()
+    return Task(partial(context.open_device, options.device))
+
+
 def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene, float]:
     """The scene and the seconds it took; its warnings are printed."""
     from clrt.scene.build import load_scene
@@ -155,7 +170,7 @@ def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene,
     return scene, time.perf_counter() - start
 
 
-def _render(options: Options, scene: Scene, progress: PhaseProgress, start: float) -> Image:
+def _render(options: Options, scene: Scene, progress: PhaseProgress, start: float, opening: Task[Device]) -> Image:
     from clrt.cli.accuracy import foretold
     from clrt.renderer import render as render_scene
 
@@ -184,6 +199,8 @@ def _render(options: Options, scene: Scene, progress: PhaseProgress, start: floa
             standard_error=options.stderr is not None,
             deadline=deadline,
             foretell=lambda told: progress.say(foretold(told, options.error)),
+            cache=options.cache,
+            opening=opening,
         )
 
 

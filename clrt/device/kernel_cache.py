@@ -13,11 +13,16 @@ import re
 import shutil
 import stat
 import tempfile
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 VARIABLE = "POCL_CACHE_DIR"
+_lock = threading.Lock()
+_loading = 0  #: threads that are in `loading`
+_LEFT_S = 3600.0  #: seconds after which an empty file is left over
 _MARK = "clrt-loading-"
 _COMPILED = "clrt-compiled-"
 #: entries of PoCL, and notes of them; POCL_CACHE_DIR may name a folder with files of the user's
@@ -31,15 +36,43 @@ def choose_folder() -> Path:
     temporary one that all processes of the user share. In that case XDG_CACHE_HOME becomes the temporary one, too:
     pyopencl cannot be imported where it cannot keep files of its own.
     """
-    home = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
+    home = _home()
     if not (_writable(home / "clrt" / "pocl") and _writable(home / "pytools")):
         home = _temporary_home()
         os.environ["XDG_CACHE_HOME"] = str(home)
     if not os.environ.get(VARIABLE):
         os.environ[VARIABLE] = str(home / "clrt" / "pocl")
     folder = Path(os.environ[VARIABLE])
-    _writable(folder)
+    if _writable(folder):
+        _sweep(folder)
     return folder
+
+
+def _sweep(folder: Path) -> None:
+    """Removes the empty files that PoCL leaves behind, one a process; those of the last hour may be in use."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.startswith("tempfile_"):
+                with suppress(OSError):
+                    found = entry.stat(follow_symlinks=False)
+                    if stat.S_ISREG(found.st_mode) and not found.st_size and found.st_mtime < time.time() - _LEFT_S:
+                        os.unlink(entry.path)
+
+
+def use_temporary_folder() -> None:
+    """Has PoCL keep its kernels in a folder that goes when the process ends; to be called before pyopencl is imported."""
+    folder = tempfile.mkdtemp(prefix="clrt-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    os.environ[VARIABLE] = folder
+
+
+def own_folder(name: str) -> Path:
+    """A folder of clrt's in the user's cache folder, which need not be there; to be called after `choose_folder`."""
+    return _home() / "clrt" / name
+
+
+def _home() -> Path:
+    return Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache"))
 
 
 def unwritable_folder() -> str | None:
@@ -115,13 +148,20 @@ def _alive(process: str) -> bool:
 
 @contextmanager
 def loading() -> Iterator[None]:
-    """While programs are loaded and launched for the first time: leaves a mark behind if the process dies in it."""
-    clear_if_one_died()
-    mark = Path(os.environ.get(VARIABLE, tempfile.gettempdir())) / f"{_MARK}{os.getpid()}"
-    with suppress(OSError):
-        mark.touch()
+    """While programs are loaded and launched for the first time: leaves a mark behind if the process dies in it; in any thread."""
+    global _loading
+    with _lock:
+        if not _loading:
+            clear_if_one_died()
+        _loading += 1
+        mark = Path(os.environ.get(VARIABLE, tempfile.gettempdir())) / f"{_MARK}{os.getpid()}"
+        with suppress(OSError):
+            mark.touch()
     try:
         yield
     finally:
-        with suppress(OSError):
-            mark.unlink(missing_ok=True)
+        with _lock:
+            _loading -= 1
+            if not _loading:
+                with suppress(OSError):
+                    mark.unlink(missing_ok=True)

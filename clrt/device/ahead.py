@@ -1,0 +1,61 @@
+"""Compiling while another core does something else: a program depends on the scene's features and sizes alone, not on its trees.
+
+PoCL compiles a kernel when it is first launched, so each is launched once, over nothing.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from clrt.device import kernel_cache, program
+from clrt.device.context import POCL, Device
+from clrt.device.session import PREPARE_LOCAL, multiple
+from clrt.tasks import Task
+
+_PREPARE = ("prepare_triangles", "prepare_planes")  #: launched over all triangles; with zeros for arguments all kernels return at once
+_DUMMY_BYTES = 1 << 16  #: more than any struct that a kernel looks into before it returns
+_KERNEL = re.compile(r"^kernel\b[^{;]*?\bvoid (\w+)\(([^)]*)\)", re.M)
+_DIRECTIVE = re.compile(r"^#.*$", re.M)
+_VALUES: dict[str, Any] = {"int": np.int32(0), "double4": np.zeros(4)}
+
+
+class Compilation(Task[Any]):
+    """A program of pictures that is compiled from now on, kernels and all, for a scene of so many triangles."""
+
+    def __init__(self, device: Device, source: str, triangles: int) -> None:
+        self.source = source
+        super().__init__(partial(_compile, device, source, triangles))
+
+
+def build(device: Device, source: str, begun: Compilation | None = None) -> Any:
+    """The program of `source`: the one that was begun, if that is the same, else built now. Raises DeviceError."""
+    return begun.result() if begun is not None and begun.source == source else program.build(device, source)
+
+
+def _compile(device: Device, source: str, triangles: int) -> Any:
+    built = program.build(device, source)
+    if device.info.platform == POCL:
+        # PoCL tells small launches from large ones, and compiles for each kind: so the sizes are those of later launches.
+        size = multiple(max(1, triangles), PREPARE_LOCAL)
+        sizes = dict.fromkeys(_PREPARE, ((size,), (PREPARE_LOCAL,))) if triangles else {}
+        _launch(device, built, source, {"render": (program.LOCAL_SIZE, program.LOCAL_SIZE), **sizes})
+    return built
+
+
+def _launch(device: Device, built: Any, source: str, sizes: dict[str, tuple[tuple[int, ...], tuple[int, ...]]]) -> None:
+    """Each kernel with its global and local size, over nothing. One that has an argument of another type is left to its first launch."""
+    import pyopencl as cl
+
+    queue = cl.CommandQueue(device.context)
+    zeros = cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=np.zeros(_DUMMY_BYTES, np.uint8))
+    with kernel_cache.loading():
+        for name, parameters in _KERNEL.findall(source):
+            declared = _DIRECTIVE.sub("", parameters).split(",")
+            arguments = [zeros if "*" in text else _VALUES.get(text.split()[0]) for text in declared]
+            if name in sizes and not any(argument is None for argument in arguments):
+                cl.Kernel(built, name)(queue, *sizes[name], *arguments)
+        queue.finish()
