@@ -9,7 +9,6 @@ enum { DONE_NODE, DONE_NODES, DONE_ENTRY, DONE_ENTRIES, DONE_WORDS };  // DONE_N
 enum { TAKEN_JOBS, TAKEN_NODES, TAKEN_ENTRIES };
 enum { NODE_KIND, NODE_VALUE, NODE_WORDS };  // depth << 2 | axis, 3 for a leaf; bits of the plane or number of triangles
 #define LEAF 3
-#define WIDE 8
 
 typedef struct {
     global int *ref;
@@ -73,7 +72,8 @@ static inline void build_put(const Stack *stack, size_t at, int ref, const float
 }
 
 // Sorts the references of a node to its children: those above stay at its start, those below come after its end. Gives their numbers.
-static void build_divide(global const double *vertices, const Stack *stack, const Open *node, const Split *split, size_t *below, size_t *above) {
+static void build_divide(global const double *vertices, const Stack *stack, const Open *node, const Split *split, size_t *below,
+                         size_t *above) {
     const size_t end = node->start + node->count;
     size_t low = end, high = node->start;
     for (size_t i = node->start; i < end; i++) {
@@ -148,8 +148,8 @@ static bool build_one(global const double *vertices, const Stack *stack, Open no
     return true;
 }
 
-// Works through jobs [first, end). memory: of each work-item, 7 rows of `size` for the stack, then room for its nodes and entries, twice `size`
-// and `size`. taken: counters, zero before; where an output is too small, they tell how large it should be.
+// Works through jobs [first, end). memory: of each work-item, 7 rows of `size` for the stack, then twice `size` for its nodes and
+// `size` for its entries. taken: counters, zero before; where an output is too small, they tell how large it should be.
 kernel void build_subtrees(global const double *vertices, global const int *jobs, global const float *cells, const int first,
                            const int end, global const int *pool_ref, global const float *pool_bounds, const int pool_rows,
                            global int *memory, const int size, global int *taken, global int *nodes, const int most_nodes,
@@ -185,7 +185,7 @@ kernel void build_subtrees(global const double *vertices, global const int *jobs
         report[DONE_ENTRIES] = (int)named;
         if (!whole) continue;
         if (node + (long)made > most_nodes || entry + (long)named > most_entries) {
-            report[DONE_NODES] = -2;
+            report[DONE_NODES] = -2;  // built, but not handed out
             continue;
         }
         for (size_t i = 0; i < made * NODE_WORDS; i++) nodes[(size_t)node * NODE_WORDS + i] = own_nodes[i];

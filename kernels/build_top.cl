@@ -120,7 +120,8 @@ kernel void build_sides(global const double *vertices, global const int *chunks,
     for (size_t i = first; i < end; i++) {
         int sides = GOES_BELOW;
         if (axis < 3) {
-            sides = (bounds[axis * (size_t)rows + i] < plane ? GOES_BELOW : 0) | (bounds[(3 + axis) * (size_t)rows + i] > plane ? GOES_ABOVE : 0);
+            sides = (bounds[axis * (size_t)rows + i] < plane ? GOES_BELOW : 0);
+            sides |= (bounds[(3 + axis) * (size_t)rows + i] > plane ? GOES_ABOVE : 0);
             if (sides == 0) sides = flat;
         }
         if (sides == (GOES_BELOW | GOES_ABOVE)) {
@@ -165,7 +166,8 @@ kernel void build_scatter(global const double *vertices, global const int *chunk
             }
         }
         for (int side = 0; side < 2; side++) {
-            if (goes[i] & (GOES_BELOW << side)) build_append(&stores[side], ref[i], part_lo[side], part_hi[side], all_lo[side], all_hi[side]);
+            if (!(goes[i] & (GOES_BELOW << side))) continue;
+            build_append(&stores[side], ref[i], part_lo[side], part_hi[side], all_lo[side], all_hi[side]);
         }
     }
     for (int side = 0; side < 2; side++) {
