@@ -35,7 +35,7 @@ from clrt.scene.model import Scene
 HIT_DTYPE = layout.HIT_RECORD
 
 _CHUNK = 1 << 20  #: rays a launch: keeps buffers small and lets Ctrl-C in
-_LOCAL = 64  #: rays a work-group
+_LOCAL = 64  #: hits a work-group
 _LIST_LIMIT = 1 << 20  #: hits listed by a launch, but for a single ray that has more
 _FIRST, _ANY, _COUNT, _LIST = 0, 1, 2, 3  #: modes of the kernel `cast`
 _GIVEN, _ORDER, _RECORDS, _RESULT, _HIT_LIST, _RAYS, _MODE, _STAGES = 11, 17, 18, 19, 20, 21, 22, 23  #: its arguments that change
@@ -245,7 +245,7 @@ class RayCaster:
         self._cast_kernel.set_arg(_ORDER, self._sorter.order(given, count) if count >= FEWEST else None)
         self._cast_kernel.set_arg(_RAYS, np.int32(count))
         self._cast_kernel.set_arg(_MODE, np.int32(mode))
-        cl.enqueue_nd_range_kernel(self._device.queue, self._cast_kernel, (-(-count // _LOCAL) * _LOCAL,), (_LOCAL,))
+        cl.enqueue_nd_range_kernel(self._device.queue, self._cast_kernel, (-(-count // program.RUN),), (1,))
 
     def _results(self, part: slice) -> NDArray[np.int32]:
         import pyopencl as cl

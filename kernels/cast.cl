@@ -1,5 +1,5 @@
 // Provides: kernels cast (arrays of rays: first, any, all hits or their number) and cast_list (the records of all hits).
-// Needs: blocks.cl, given.cl, hit_record.cl, structs.  Reads: nothing.
+// Needs: blocks.cl, given.cl, hit_record.cl, structs.  Reads: RUN (rays a work-item).
 //
 // A ray is traced with its direction at unit length and its origin relative to the local origin, rounded to `real`: both within the errors
 // that triangle.cl and box.cl allow for.
@@ -7,7 +7,6 @@
 #define ANY_HIT 1
 #define COUNT_HITS 2
 #define LIST_HITS 3
-#define AHEAD 12  // rays that are asked for before their turn
 
 // What is traced of a ray; one that is known to miss gets an empty interval.
 HOT void ray_begin(const GivenRay *ray, int good, const Geometry *geometry, real extent, Rays *rays) {
@@ -37,11 +36,9 @@ void cast(global const WideNode *wide, global const Block *blocks, global const 
           global int2 *list, int count, int mode
           //@ parameters
 ) {
-    const int place = get_global_id(0);
-    if (place >= count) return;
+    const int first = RUN * get_global_id(0), end = min(count, first + RUN);
+    if (first >= count) return;
     const GivenRays given = GIVEN_ARGUMENTS;
-    const int number = order ? order[place] : place;
-    if (order && place + AHEAD < count) ray_given_prefetch(&given, order[place + AHEAD]);
     Geometry geometry;
     geometry.nodes = 0;
     geometry.indices = 0;
@@ -58,25 +55,35 @@ void cast(global const WideNode *wide, global const Block *blocks, global const 
     geometry.local_origin[1] = local_origin.y;
     geometry.local_origin[2] = local_origin.z;
     //@ begin
-    GivenRay ray;
-    Rays rays;
-    Hits hits;
-    ray_begin(&ray, ray_given_scaled(&given, number, &ray), &geometry, extent, &rays);
-    // To count or list, one hit is sought after the other, in the order of t and id, until there is no further one.
-    int found = 0;
-    while (found <= slot_count) {
-        hits.t = rays.t_max;
-        hits.slot = -1;
-        //@ hits_begin
-        if (rays.active) scene_trace(&geometry, &rays, 0, mode == ANY_HIT, &hits);
-        if (mode < COUNT_HITS || hits.slot < 0) break;
-        if (mode == LIST_HITS) list[result[number] + found] = (int2)(hits.slot, number);
-        found++;
-        rays.after = hits.slot;
-        rays.after_t = hits.t;
+    // Three loops, as memory that one ray waits for is then asked for while others are at work.
+    GivenRay run[RUN];
+    int good[RUN], slot[RUN];
+    for (int i = first; i < end; i++) good[i - first] = ray_given_scaled(&given, order ? order[i] : i, run + i - first);
+    for (int i = first; i < end; i++) {
+        const int number = order ? order[i] : i;
+        if (order && i + RUN < count) ray_given_ahead(&given, order[i + RUN]);
+        if (mode == FIRST_HIT) fetch_ahead(records + number, sizeof(HitRecord), 1);
+        Rays rays;
+        Hits hits;
+        ray_begin(run + i - first, good[i - first], &geometry, extent, &rays);
+        // To count or list, one hit is sought after the other, in the order of t and id, until there is no further one.
+        int found = 0;
+        while (found <= slot_count) {
+            hits.t = rays.t_max;
+            hits.slot = -1;
+            //@ hits_begin
+            if (rays.active) scene_trace(&geometry, &rays, 0, mode == ANY_HIT, &hits);
+            if (mode < COUNT_HITS || hits.slot < 0) break;
+            if (mode == LIST_HITS) list[result[number] + found] = (int2)(hits.slot, number);
+            found++;
+            rays.after = hits.slot;
+            rays.after_t = hits.t;
+        }
+        if (mode == ANY_HIT || mode == COUNT_HITS) result[number] = mode == COUNT_HITS ? found : (int)hits.slot;
+        slot[i - first] = hits.slot;
     }
-    if (mode == FIRST_HIT) hit_record(vertices, sources, &ray, hits.slot, records + number);
-    else if (mode != LIST_HITS) result[number] = mode == COUNT_HITS ? found : (int)hits.slot;
+    if (mode != FIRST_HIT) return;
+    for (int i = first; i < end; i++) hit_record(vertices, sources, run + i - first, slot[i - first], records + (order ? order[i] : i));
 }
 
 // The records of the `count` hits in `list`.

@@ -50,11 +50,19 @@ HOT int ray_given_scaled(const GivenRays *rays, size_t i, GivenRay *ray) {
     return 1;
 }
 
-// Asks for the ray's numbers ahead of their use: rays in sorted order lie anywhere in the caller's arrays.
-HOT void ray_given_prefetch(const GivenRays *rays, size_t i) {
+// Asks for memory ahead of its use, to read or to write it; rays in sorted order lie anywhere in the caller's arrays.
 #ifdef __clang__
-    const size_t step_o = rays->kinds & 1 ? 12 : 24, step_d = rays->kinds & 2 ? 12 : 24;
-    if (!(rays->kinds & 16)) __builtin_prefetch((const void *)(size_t)(rays->origins + step_o * i));
-    if (!(rays->kinds & 32)) __builtin_prefetch((const void *)(size_t)(rays->directions + step_d * i));
+#define fetch_ahead(pointer, bytes, write)                                              \
+    {                                                                                   \
+        __builtin_prefetch((const void *)(size_t)(pointer), write);                      \
+        __builtin_prefetch((const void *)((size_t)(pointer) + (bytes) - 1), write);       \
+    }
+#else
+#define fetch_ahead(pointer, bytes, write)
 #endif
+
+HOT void ray_given_ahead(const GivenRays *rays, size_t i) {
+    const size_t origin = rays->kinds & 1 ? 12 : 24, direction = rays->kinds & 2 ? 12 : 24;
+    if (!(rays->kinds & 16)) fetch_ahead(rays->origins + origin * i, origin, 0);
+    if (!(rays->kinds & 32)) fetch_ahead(rays->directions + direction * i, direction, 0);
 }

@@ -41,6 +41,7 @@ PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a
 TILE = (16, 8)  #: pixels of a tile, width and height: whole packets of any size
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
+RUN = 32  #: rays of a work-item in arrays of rays
 SORT_BITS = 3  #: an axis, of the grid of origins by which rays are sorted; measured: more change nothing
 MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
 #: what stands at a place where no effect adds anything
@@ -134,7 +135,7 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     values: dict[str, int] = {"REAL_BITS": precision.bits, "LANES": lanes, "PACKET_WIDTH": width, "PACKET_HEIGHT": height,
                               "STACK_SIZE": shape.stack}  # fmt: skip
     if shape.block:
-        values |= {"BLOCK": shape.block, "SORT_BITS": SORT_BITS}
+        values |= {"BLOCK": shape.block, "SORT_BITS": SORT_BITS, "RUN": RUN}
     names = {f.name for f in features.active}
     if "sampling" in names:
         values |= {"TILE_WIDTH": TILE[0], "TILE_HEIGHT": TILE[1]}
