@@ -7,7 +7,7 @@ SCENE ?= scenes/first.txt
 PICTURE ?= out/$(basename $(notdir $(SCENE))).png
 
 .DEFAULT_GOAL := help
-.PHONY: help run test test-all lint bench study docs clean
+.PHONY: help run test test-all lint bench asm study docs clean
 
 help: ## this list
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/make \1\t\2/p' $(MAKEFILE_LIST) | expand -t 16
@@ -28,6 +28,9 @@ lint: $(VENV)/dev.stamp ## ruff and mypy
 
 bench: $(VENV)/bench.stamp ## measure, into bench-results/; BENCH=--write-docs fills the tables of the documentation
 	$(BIN)/python -m clrt.bench $(BENCH)
+
+asm: $(VENV)/bench.stamp ## the compiled loops of the traversal, with counts of calls and spills; ASM="SCENE --precision exact" for others
+	$(BIN)/python -m clrt.bench.asm $(ASM)
 
 study: $(VENV)/study.stamp ## study six scenes, into study-results/ and docs/accuracy.md; STUDY=--quick into out/study alone
 	$(BIN)/python -m clrt.study.project $(STUDY)
