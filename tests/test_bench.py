@@ -19,7 +19,7 @@ from clrt.bench.incoherent import closed_room, scattered_rays
 from clrt.bench.marks import marks_of
 from clrt.bench.measure import whole_from_sample
 from clrt.bench.programs import absent_bytes
-from clrt.bench.versus import DARK, LIT, SHADOWED, compared, times_of
+from clrt.bench.versus import DARK, LIT, SHADOWED, compared, compared_general, times_of
 from clrt.device.program import Shape, compose
 from clrt.errors import ClrtError
 from clrt.features import Features
@@ -107,6 +107,13 @@ def test_a_difference_of_times_below_zero_is_no_negative_rate() -> None:
     series = view_series()
     series[f"clrt fast, {SHADOWED}"] = Series((0.01, 0.02, 0.03))
     assert min(times_of("clrt fast", "shadow", series)) > 0.0
+
+
+def test_rays_of_any_origin_are_compared_without_what_makes_them() -> None:
+    names = {"clrt, picture": 0.05, "clrt, picture of nothing": 0.03, "Embree C++": 0.03, "Embree C++, reading": 0.005, "Mitsuba": 0.04}
+    found = compared_general({name: Series((s, 2 * s)) for name, s in names.items()}, 1_000_000)
+    assert found["rates"] == pytest.approx({"clrt": 1 / 0.03, "clrt, picture": 1 / 0.075, "Embree C++": 1 / 0.0375, "Mitsuba": 1 / 0.06})
+    assert {name: ratio["low"] for name, ratio in found["ratios"].items()} == pytest.approx({"Embree C++": 1.25, "Mitsuba": 2.0})
 
 
 def verdicts(results: dict[str, Any]) -> dict[str, bool | None]:

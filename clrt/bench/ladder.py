@@ -27,7 +27,7 @@ def measure_ladder(bench: BenchScene, size: int, rounds: int, device: Device) ->
 
 
 def _rows(scene: Scene, rounds: int, device: Device) -> list[dict[str, Any]]:
-    prepared, features = build_trees(scene, "sah", _silent), Features.of(scene)
+    prepared, features = build_trees(scene, "sah", _silent, device), Features.of(scene)
     tracers = {name: open_tracer(prepared, features, rung(name), device, _silent)[1] for name in RUNGS}
     series = interleave({name: partial(tracer.run, 0, tracer.height) for name, tracer in tracers.items()}, rounds)
     base, rows = series[BASE], []

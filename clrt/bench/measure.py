@@ -10,6 +10,7 @@ from typing import Any
 from clrt.bench.growth import Reach
 from clrt.bench.scenes import BenchScene
 from clrt.bench.versus import opened
+from clrt.bench.warm import compile_builder
 from clrt.device.context import Device
 from clrt.renderer import build_trees, render, run_rows
 from clrt.scene.model import Scene
@@ -72,7 +73,8 @@ def measure_trees(bench: BenchScene, plan: Plan, device: Device) -> list[dict[st
     """A row a size and tree: figures of the tree, its render time, brute force's, and how many times faster it is."""
     counted = min(plan.brute_count_size, *plan.sizes)
     brute_tests = figures(bench.scene.with_size(counted, counted), _BASELINE, device).tests_per_ray
-    builds = interleave({tree: partial(build_trees, bench.scene, tree, _silent) for tree in TREES}, plan.rounds)
+    compile_builder(device)
+    builds = interleave({tree: partial(build_trees, bench.scene, tree, _silent, device) for tree in TREES}, plan.rounds)
     rows = []
     for size in plan.sizes:
         sampled = size * size * bench.scene.triangle_count > plan.brute_limit

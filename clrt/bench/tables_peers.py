@@ -74,9 +74,10 @@ def general_table(general: dict[str, Any]) -> Table:
         rows.append([name, f"{rate:.1f}", interval(general["ratios"][name]) if name in general["ratios"] else "-"])
     note = (
         f"The same view through a lens, {general['size']} squared: {general['rays']:,} rays, of which each begins elsewhere and neighbours "
-        "have nearly the same direction. clrt draws them and shades what they hit, in packets for any origin; the others find the same "
-        "rays in arrays. RayCaster.first_hit takes and gives NumPy arrays, and its time has all of that in it. The last column has clrt's "
-        "picture over each of the others."
+        "have nearly the same direction. A picture of clrt draws them, traces them in packets for any origin and shades their hits; "
+        "drawing points of the lens takes much of its time, so `clrt` is the picture less the same picture of nothing: tracing and shading. "
+        "Embree C++ likewise is without the reading of its rays. The others are whole calls over arrays of the same rays; "
+        "RayCaster.first_hit takes and gives NumPy arrays. The last column has `clrt` over each of the others."
     )
     return Table("Rays of any origin", ["tracer", "million rays a second", "clrt over it, 95%"], rows, note=note)
 

@@ -44,12 +44,14 @@ KINDS = ("primary", "shadow", "both")
 EMBREEX = "embreex"
 #: the difference of two of clrt's pictures tells what shadow rays alone cost
 DARK, LIT, SHADOWED = "without lights", "lit, no shadows", "lit, with shadows"
+#: rays through a lens: the picture, the same without anything to hit, and what Embree's driver takes to read them
+_PICTURE, _NOTHING, _COPY = "clrt, picture", "clrt, picture of nothing", f"{EMBREE}, reading"
 _LEAST = 1e-6  #: seconds; a difference of two times may be lost in noise
 
 
 def opened(scene: Scene, tree: str, device: Device, without: str | None = None, precision: str = DEFAULT) -> Tracer:
     """A tracer with trees built, buffers filled and program compiled; `without`: an effect to leave out."""
-    prepared = build_trees(scene, tree, lambda phase, fraction: None)
+    prepared = build_trees(scene, tree, lambda phase, fraction: None, device)
     features = Features(tuple(line for line in Features.of(scene).lines if line[0] != without))
     return open_tracer(prepared, features, rung(precision), device, lambda phase, fraction: None)[1]
 
@@ -152,9 +154,8 @@ def _add_workers(turns: Round, peers: Peers, rays: Mapping[str, RaySet], size: i
 def times_of(contender: str, kind: str, series: Mapping[str, Series]) -> tuple[float, ...]:
     """Seconds of a contender for rays of a kind, round by round."""
     if contender.startswith("clrt"):
-        dark, lit, shadowed = (series[f"{contender}, {what}"].seconds for what in (DARK, LIT, SHADOWED))
-        shadow = tuple(max(a - b, _LEAST) for a, b in zip(shadowed, lit, strict=True))
-        return {"primary": dark, "shadow": shadow, "both": shadowed}[kind]
+        dark, lit, shadowed = (series[f"{contender}, {what}"] for what in (DARK, LIT, SHADOWED))
+        return {"primary": dark.seconds, "shadow": _less(shadowed, lit), "both": shadowed.seconds}[kind]
     if contender == EMBREE:
         ways = series[f"{EMBREE}, shadow"], series[f"{EMBREE}, light"]
         shadow = min(ways, key=lambda way: way.median).seconds  # from the point or from the light: whichever is faster
@@ -181,30 +182,48 @@ def compared(series: Mapping[str, Series], rays: Mapping[str, Mapping[str, int]]
 
 
 def _general(scene: Scene, rounds: int, device: Device, peers: Peers, embreex: Embreex | None, scratch: Path) -> dict[str, Any]:
-    """Rays through a lens: each begins elsewhere. clrt makes them and shades what they hit; all others find the very same in arrays."""
+    """Rays through a lens: each begins elsewhere. clrt draws them and shades what they hit; all others find the very same in arrays."""
     seen, size = view.with_lens(scene), scene.camera.width
     rays = view.lens_rays(seen)
-    tracer = opened(seen, "sah", device)
     caster = RayCaster(seen, DEFAULT, device=device.info.name)
-    contenders: Contenders = {"clrt": partial(tracer.run, 0, size)}
-    contenders["clrt, RayCaster.first_hit"] = partial(caster.first_hit, rays.origins, rays.directions)
+    contenders: Contenders = {
+        _PICTURE: partial(opened(seen, "sah", device).run, 0, size),
+        _NOTHING: partial(opened(view.emptied(seen), "sah", device).run, 0, size),
+        "clrt, RayCaster.first_hit": partial(caster.first_hit, rays.origins, rays.directions),
+    }
     files = scratch / "general.npy", scratch / "general.bin"
     view.write_rays(rays, files[0])
     view.write_packets(rays, size, files[1])
     for worker in peers.workers:
-        by_packets = worker.name == EMBREE
-        worker.ask(*(("load", files[1]) if by_packets else ("load", "general", files[0])))
-        contenders[worker.name] = partial(worker.run, *(("general",) if by_packets else ("run", "general")))
+        if worker.name == EMBREE:
+            worker.ask("load", files[1])
+            contenders |= {EMBREE: partial(worker.run, "general"), _COPY: partial(worker.run, "copy")}
+        else:
+            worker.ask("load", "general", files[0])
+            contenders[worker.name] = partial(worker.run, "run", "general")
     if embreex is not None:
         embreex.load("general", rays)
         contenders[EMBREEX] = partial(embreex.trace, "general")
     series = interleave(contenders, rounds)
-    return {
-        "size": size, "rays": len(rays), "hit_share": float(np.mean(caster.first_hit(rays.origins, rays.directions)["prim_id"] >= 0)),
-        "seconds": {name: times.to_json() for name, times in series.items()},
-        "rates": {name: len(rays) / times.median / 1e6 for name, times in series.items()},
-        "ratios": {name: paired(t.seconds, series["clrt"].seconds).to_json() for name, t in series.items() if not name.startswith("clrt")},
-    }  # fmt: skip
+    hit = float(np.mean(caster.first_hit(rays.origins, rays.directions)["prim_id"] >= 0))
+    seconds = {name: times.to_json() for name, times in series.items()}
+    return {"size": size, "rays": len(rays), "hit_share": hit, "seconds": seconds} | compared_general(series, len(rays))
+
+
+def compared_general(series: Mapping[str, Series], rays: int) -> dict[str, Any]:
+    """Rates and clrt's ratios over others, of tracing alone for clrt and Embree: without what makes or reads the rays."""
+    own = _less(series[_PICTURE], series[_NOTHING])
+    taken = {"clrt": own} | {name: s.seconds for name, s in series.items() if name not in (_NOTHING, _COPY)}
+    if _COPY in series:
+        taken[EMBREE] = _less(series[EMBREE], series[_COPY])
+    rates = {name: rays / statistics.median(seconds) / 1e6 for name, seconds in taken.items()}
+    others = {name: seconds for name, seconds in taken.items() if not name.startswith("clrt")}
+    return {"rates": rates, "ratios": {name: paired(seconds, own).to_json() for name, seconds in others.items()}}
+
+
+def _less(whole: Series, part: Series) -> tuple[float, ...]:
+    """The difference of two contenders, round by round."""
+    return tuple(max(a - b, _LEAST) for a, b in zip(whole.seconds, part.seconds, strict=True))
 
 
 def cores_used(run: Callable[[], object]) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,13 @@ def with_lens(scene: Scene) -> Scene:
     diagonal = float(np.linalg.norm(hi - lo))
     lens = Lens(_LENS * diagonal, float(np.linalg.norm((lo + hi) / 2.0 - scene.camera.eye)))
     return Scene(scene.camera, (), scene.materials, scene.objects, source="<view>", lens=lens, samples=1)
+
+
+def emptied(scene: Scene) -> Scene:
+    """The same rays, which meet nothing: of the mesh, one triangle stays, far above the camera and out of its sight."""
+    mesh = scene.objects[0].vertices
+    height = 100.0 * float(np.linalg.norm(np.ptp(mesh.reshape(-1, 3), axis=0)))
+    return replace(scene, objects=(mesh_object(mesh[:1] + np.array([0.0, height, 0.0]), 0, "nothing"),))
 
 
 def lens_rays(scene: Scene) -> RaySet:
