@@ -29,7 +29,7 @@ def local_origin(scene: Scene) -> FloatArray:
 
     A large sphere, such as a floor, does not move it: its centre is far from what is seen of it.
     """
-    boxes = [(o.vertices.min((0, 1)), o.vertices.max((0, 1))) for o in scene.objects if len(o) and not o.hidden]
+    boxes = [o.box for o in scene.objects if len(o) and not o.hidden]
     if scene.instances:
         boxes += zip(*placed_boxes(scene, placements(scene), points=0.0), strict=True)
     if boxes:
@@ -49,9 +49,10 @@ def tree_origins(scene: Scene) -> FloatArray:
 def leaf_order(tree: KdTree, triangles: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """The triangles that leaves name, in the order of their first naming: (order, slot of each triangle or -1)."""
     entries = len(tree.indices)
-    first = np.full(triangles, entries, np.int64)
-    first[tree.indices[::-1]] = np.arange(entries - 1, -1, -1)  # of equal indices the last write stays: the first naming
-    order = np.argsort(first, kind="stable")[: np.count_nonzero(first < entries)]
+    places = np.arange(entries)
+    first = np.empty(triangles, np.int64)
+    first[tree.indices[::-1]] = places[::-1]  # of equal indices the last write stays: the first naming
+    order = tree.indices[first[tree.indices] == places].astype(np.int64)
     slots = np.full(triangles, -1, np.int64)
     slots[order] = np.arange(len(order))
     return order, slots
@@ -70,7 +71,8 @@ def unit_normals(vertices: FloatArray) -> FloatArray:
     """(n, 3) unit geometric normals; zero for zero area. Edges are scaled first, so that no size over- or underflows."""
     e1, e2 = vertices[:, 1] - vertices[:, 0], vertices[:, 2] - vertices[:, 0]
     for e in (e1, e2):
-        size = np.abs(e).max(1, keepdims=True)
+        x, y, z = np.abs(e).T
+        size = np.maximum(np.maximum(x, y), z)[:, None]
         np.divide(e, size, out=e, where=size > 0)
     normal = np.cross(e1, e2)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
@@ -90,7 +92,7 @@ def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: P
         indices.append((slots[tree.indices] + slot).astype(np.int32))
         orders.append(order)
         node, index, slot = node + len(tree.split_axis), index + len(tree.indices), slot + len(order)
-    given = [item.vertices[order] for item, order in zip(scene.objects, orders, strict=True)]
+    given = [np.take(item.vertices, order, 0) for item, order in zip(scene.objects, orders, strict=True)]
     vertices = np.concatenate(given) if given else np.zeros((0, 3, 3))
     return Packed(
         scene=scene,
@@ -117,8 +119,9 @@ def _prim_ids(scene: Scene, orders: Sequence[NDArray[np.int64]]) -> NDArray[np.i
 def _object_record(item: MeshObject, tree: KdTree, root: int, real: type[np.floating]) -> NDArray[np.void]:
     record = np.zeros((), layout.object_record(real))
     record["lo"], record["hi"] = rounded_down(tree.lo, real), rounded_up(tree.hi, real)
-    edges = np.abs(item.vertices[:, [1, 2, 0]] - item.vertices).sum(2)
-    reach = np.maximum(np.abs(tree.lo), np.abs(tree.hi)).sum() + edges.max(initial=0.0)
+    edges = (np.abs(item.vertices[:, (c + 1) % 3] - item.vertices[:, c]).T for c in range(3))
+    longest = max((x + y + z).max(initial=0.0) for x, y, z in edges)
+    reach = np.maximum(np.abs(tree.lo), np.abs(tree.hi)).sum() + longest
     record["extent"] = rounded_up(np.asarray(reach), real)
     record["root"] = root
     return record

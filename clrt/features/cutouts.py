@@ -6,7 +6,7 @@ import numpy as np
 
 from clrt.features import lamps, placed, sampled, shapes, surfaces, surroundings
 from clrt.features.feature import REAL, Caller, Feature, Joint, used_materials
-from clrt.scene.model import Material, Scene
+from clrt.scene.model import Material, Scene, numbers_in
 
 
 def _opacity_line(scene: Scene, material: Material) -> int:
@@ -43,7 +43,7 @@ def _glow_map_caller(scene: Scene) -> int | None:
 
 def _round_picture_caller(scene: Scene) -> int | None:
     """A picture on a round primitive."""
-    used = [scene.materials[i] for i in np.unique(scene.spheres.material_ids).tolist()]
+    used = [scene.materials[i] for i in numbers_in(scene.spheres.material_ids)]
     numbers = {i for m in used for i in (m.texture, m.normal_map, m.metal_rough_map, m.emission_map) if i >= 0}
     return min((scene.textures[i].line for i in numbers), default=None)
 

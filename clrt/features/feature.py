@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 from weakref import WeakKeyDictionary
 
-import numpy as np
-
-from clrt.scene.model import Material, Scene
+from clrt.scene.model import Material, Scene, numbers_in
 
 REAL = "real"  #: stands for the rung's number type in `Feature.material` and `Feature.frame`
 
@@ -93,9 +91,9 @@ _USED: WeakKeyDictionary[Scene, tuple[Material, ...]] = WeakKeyDictionary()  #: 
 def used_materials(scene: Scene) -> Iterator[Material]:
     """The materials of a scene that some primitive has."""
     if scene not in _USED:
-        used: set[int] = set(np.unique(scene.spheres.material_ids).tolist())
+        used: set[int] = set(numbers_in(scene.spheres.material_ids))
         for item in scene.objects:
-            used |= set(np.unique(item.material_ids).tolist())
+            used |= set(item.used_materials)
         _USED[scene] = tuple(scene.materials[i] for i in sorted(used))
     return iter(_USED[scene])
 

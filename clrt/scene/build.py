@@ -203,7 +203,7 @@ def _rival(word: Word, name: str, material: int, first: dict[tuple[str, int], in
 def _check_absorption(objects: tuple[MeshObject, ...], materials: list[Material], found: Declarations, faults: Faults) -> None:
     """A medium fills its object whole: all glass of an object absorbs alike."""
     for item in objects:
-        glass = [materials[i] for i in np.unique(item.material_ids).tolist() if materials[i].refract > 0.0]
+        glass = [materials[i] for i in item.used_materials if materials[i].refract > 0.0]
         if len({m.absorb for m in glass}) < 2:
             continue
         line = min(m.absorb_line for m in glass if m.absorb_line)

@@ -7,12 +7,19 @@ never written to after construction. A `Scene` holds no device data and imports 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+
+
+def numbers_in(ids: IntArray) -> list[int]:
+    """The numbers that occur in ids (n,), each at least -1, in ascending order. In one go, where np.unique would sort."""
+    found: list[int] = (np.flatnonzero(np.bincount(ids + 1)) - 1).tolist()
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,6 +300,19 @@ class MeshObject:
 
     def __len__(self) -> int:
         return len(self.vertices)
+
+    @cached_property
+    def box(self) -> tuple[FloatArray, FloatArray]:
+        """The least and the greatest coordinates (3,) of its own triangles; zeros where there are none."""
+        if not len(self):
+            return np.zeros(3), np.zeros(3)
+        axes = [self.vertices[:, :, axis] for axis in range(3)]  # axis by axis: NumPy reduces few long rows much sooner than many short ones
+        return np.array([values.min() for values in axes]), np.array([values.max() for values in axes])
+
+    @cached_property
+    def used_materials(self) -> list[int]:
+        """The materials of its triangles, in ascending order."""
+        return numbers_in(self.material_ids)
 
 
 @dataclass(frozen=True, eq=False)

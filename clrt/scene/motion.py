@@ -65,7 +65,7 @@ def _with_moving_objects(scene: Scene, calls: list[WordCall], found: Declaration
 
 
 def _check_shining(scene: Scene, item: MeshObject, call: WordCall, faults: Faults) -> None:
-    if any(max(scene.materials[i].emission) > 0.0 for i in np.unique(item.material_ids).tolist()):
+    if any(max(scene.materials[i].emission) > 0.0 for i in item.used_materials):
         faults.add(call.line, call.column, f"{item.name} sends out light (arealight), and lights do not move; close its parts with O lines")
 
 
@@ -117,7 +117,7 @@ def _passing(scene: Scene) -> list[int]:
 
 
 def _is_glass(scene: Scene, item: MeshObject) -> bool:
-    return any(scene.materials[i].refract > 0.0 for i in np.unique(item.material_ids).tolist())
+    return any(scene.materials[i].refract > 0.0 for i in item.used_materials)
 
 
 def _enters(first: float, last: float, start: FloatArray, way: FloatArray, lo: FloatArray, hi: FloatArray) -> bool:

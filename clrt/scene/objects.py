@@ -106,7 +106,9 @@ def build_objects(
     closing = found.get("O", 0).lines
     group = np.searchsorted(closing, soup.lines)
     spheres = np.searchsorted(closing, found.get("S", 4).lines)  # an O below spheres alone is habit, no sign of missing triangles
-    empty = np.setdiff1d(np.arange(len(closing)), np.concatenate([group, spheres]))
+    closed = np.zeros(len(closing) + 1, np.bool_)
+    closed[group] = closed[spheres] = True
+    empty = np.flatnonzero(~closed[:-1])
     note(warnings, closing[empty].tolist(), "O closes no triangles and is left out", "O lines close no triangles and are left out")
     normals = checked_face_normals(soup, warnings)
     vertex_normals = checked_vertex_normals(soup, normals, warnings)

@@ -103,9 +103,7 @@ def object_origins(scene: Scene, origin: FloatArray) -> FloatArray:
 
 def box_of(item: MeshObject) -> tuple[FloatArray, FloatArray]:
     """The least and the greatest coordinates (3,) of an object's own triangles; zeros where there are none."""
-    if not len(item):
-        return np.zeros(3), np.zeros(3)
-    return item.vertices.min((0, 1)), item.vertices.max((0, 1))
+    return item.box
 
 
 def swept(scene: Scene, lo: FloatArray, hi: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:

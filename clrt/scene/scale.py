@@ -26,7 +26,7 @@ def size_exponent(scene: Scene) -> int:
 
 
 def _boxes(scene: Scene) -> Iterator[tuple[FloatArray, FloatArray]]:
-    return ((o.vertices.min((0, 1)), o.vertices.max((0, 1))) for o in scene.objects if len(o))
+    return (o.box for o in scene.objects if len(o))
 
 
 def at_working_size(scene: Scene) -> Scene:
