@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from clrt.adaptive import request as accuracy
-from clrt.adaptive.replicates import Replicates
 from clrt.adaptive.request import Foretell, Request
 from clrt.device import ahead, kernel_cache, program
 from clrt.device.ahead import Compilation
@@ -21,10 +21,9 @@ from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
 from clrt.features.choice import effect_names, not_called_for
 from clrt.files import atomic_write
-from clrt.forest import choose as forest
 from clrt.image.image import Image
 from clrt.kdtree.boxtree import depth_limit
-from clrt.kdtree.common import default_max_depth
+from clrt.kdtree.common import F64, default_max_depth
 from clrt.kdtree.saved import saved_trees
 from clrt.kdtree.tree import KdTree
 from clrt.precision import DEFAULT, Precision, rung
@@ -35,6 +34,9 @@ from clrt.scene.words.frame import MOST_SAMPLES
 from clrt.stats import ObjectStats, RunStats
 from clrt.store import Store
 from clrt.tasks import Task
+
+if TYPE_CHECKING:
+    from clrt.adaptive.replicates import Replicates
 
 Progress = Callable[[str, float], None]
 
@@ -177,7 +179,12 @@ def build_trees(scene: Scene, tree: str, tell: Progress, device: Device | None =
 
     store : where trees of earlier runs are
     """
-    build = partial(forest.build_trees, builder=tree, device=device, tell=partial(tell, "trees"))
+
+    def build(meshes: Sequence[F64], origins: F64) -> tuple[list[KdTree], list[float]]:
+        from clrt.forest import choose
+
+        return choose.build_trees(meshes, origins, tree, device, partial(tell, "trees"))
+
     trees, seconds = saved_trees(store, [item.vertices for item in scene.objects], tree_origins(scene), tree, build)
     return Prepared(scene, tuple(trees), tuple(seconds))
 
@@ -280,6 +287,8 @@ def _count(prepared: Prepared, buffers: Buffers, stats: RunStats, tell: Progress
     if replicates is None:
         run_rows(tracer, "count", tell)
     else:
+        from clrt.adaptive.replicates import Replicates
+
         Replicates(tracer, replicates.count).replay(replicates.launches)
     kinds = buffers.features.ray_kinds
     stats.ray_counts = {kind: int(n) for kind, n in zip(kinds, tracer.counts, strict=False)}

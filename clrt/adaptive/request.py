@@ -1,4 +1,4 @@
-"""What a caller asks of a picture's accuracy, checked, and how it is carried out."""
+"""What a caller asks of a picture's accuracy, checked, and how it is carried out, by modules that are imported where it is asked."""
 
 from __future__ import annotations
 
@@ -6,22 +6,24 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from clrt.adaptive.engine import Engine, Goal, Outcome
-from clrt.adaptive.predict import Forecast
-from clrt.adaptive.replicates import HALVES, MAP_REPLICATES, Replicates
-from clrt.device.session import Tracer
 from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
 from clrt.features.camera import SAMPLES
 from clrt.stats import RunStats
 
+if TYPE_CHECKING:
+    from clrt.adaptive.engine import Goal, Outcome
+    from clrt.adaptive.predict import Forecast
+    from clrt.adaptive.replicates import Replicates
+    from clrt.device.session import Tracer
+
 ERRORS = (1e-6, 1.0)  #: that may be asked for
 LONGEST_S = 1e6  #: that may be asked for
 _CONTRAST = 1.0 / 256.0  #: a step of an 8-bit picture: what is refined where a time is given and no error
 
-Foretell = Callable[[Forecast], None]
+Foretell = Callable[["Forecast"], None]
 
 
 @dataclass(frozen=True)
@@ -61,6 +63,8 @@ class Request:
     @property
     def replicates(self) -> int:
         """How many the picture is made of."""
+        from clrt.adaptive.replicates import HALVES, MAP_REPLICATES
+
         return MAP_REPLICATES if self.pixels else HALVES
 
     def samples(self, given: int | None) -> int | None:
@@ -69,6 +73,8 @@ class Request:
 
     def goal(self, samples: int) -> Goal:
         """Raises ClrtError where `samples`, those of the scene, cannot be split."""
+        from clrt.adaptive.engine import Goal
+
         if not self.split:
             return Goal(self.error, self.deadline)
         count = self.replicates
@@ -99,6 +105,9 @@ def sample(
     """Carries out a request, where one was made. Raises LimitError, ClrtError."""
     if not request:
         return None, None
+    from clrt.adaptive.engine import Engine
+    from clrt.adaptive.replicates import Replicates
+
     buffers = tracer.buffers
     goal = request.goal(buffers.packed.scene.samples)
     replicates = Replicates(tracer, request.replicates)

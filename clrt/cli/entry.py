@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
+import sys
 from types import FrameType
 from typing import NoReturn
 
@@ -12,6 +14,10 @@ def main() -> None:
     """The console script and `python -m clrt`."""
     # NumPy's linear algebra starts a thread a core, which spins through the first 0.1 s; nothing here multiplies large matrices.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # The collector of cycles would look through all modules some twenty times while they are imported.
+    gc.set_threshold(100_000)
+    # Two threads take turns at Python: one that waits for it after each call into NumPy would else wait 5 ms each time.
+    sys.setswitchinterval(2e-4)
     asked = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else the caller had it ignored, as for background jobs
     if asked:
         signal.signal(signal.SIGINT, _leave)

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from clrt.kdtree.arrays import LEAF, TreeArrays
-from clrt.kdtree.validate import validate
 
 TRAVERSAL_COST = 8.0  #: one step down the tree, in triangle tests, as packets of 16 rays have it
 
@@ -66,4 +65,6 @@ class KdTree(TreeArrays):
 
         Returns the number of stray references: entries whose triangle is surely away from its leaf. They cost time, never a hit.
         """
+        from clrt.kdtree.validate import validate
+
         return validate(self, np.asarray(vertices, np.float64), max_depth)

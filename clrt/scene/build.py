@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +19,9 @@ from clrt.scene.faults import Faults
 from clrt.scene.grammar import LETTERS
 from clrt.scene.include import expand
 from clrt.scene.instances import build_instances, splits
-from clrt.scene.mesh_lines import place_mesh_lines, read_mesh_lines
+from clrt.scene.meshes import Meshes
 from clrt.scene.model import Environment, Instance, Material, MeshObject, PointLight, Scene, Spheres
-from clrt.scene.models.direct import is_model, load_model_scene
+from clrt.scene.models import is_model
 from clrt.scene.motion import with_motion
 from clrt.scene.objects import build_objects, material_of
 from clrt.scene.picture import Folders
@@ -28,6 +29,9 @@ from clrt.scene.text import Declarations, read_declarations, read_file
 from clrt.scene.textures import read_textures, untilted
 from clrt.scene.triangles import flip_x
 from clrt.scene.words import WORDS, Draft, Word
+
+if TYPE_CHECKING:
+    from clrt.scene.mesh_lines import MeshLine
 
 _ANYTHING = re.compile(r"[^\s\ufeff]")
 
@@ -49,6 +53,8 @@ def load_scene(
         for given, option in ((right_handed, "--right-handed"), (split_objects, "--split-objects")):
             if given:
                 raise SceneError(f"{path}: error: {option} is for scene texts; axes and objects of a glTF file are known, leave it out")
+        from clrt.scene.models.direct import load_model_scene
+
         return load_model_scene(Path(path), camera=camera, allow_paths=[Path(p) for p in allow_paths])
     if camera is not None:
         raise SceneError(f"{path}: error: --camera chooses among the cameras of a glTF file; a scene text has one, leave it out")
@@ -79,7 +85,7 @@ def parse_scene(
     _check_words(found, faults)
     textured = read_textures(found, folders, faults)
     environment = read_environment(found, folders, faults)
-    mesh_lines = read_mesh_lines(found, folders, faults)
+    mesh_lines = _mesh_lines(found, folders, faults)
     camera = build_camera(found, right_handed, faults)
     faults.raise_if_any()
     assert camera is not None  # a camera that cannot be built is a fault
@@ -90,7 +96,11 @@ def parse_scene(
     for call in found.words:
         WORDS[call.name].apply(draft, call)
     triangles, own = sum(map(len, objects)), len(textured.textures)
-    meshes = place_mesh_lines(mesh_lines, triangles, len(objects), draft.materials, own, found, right_handed, faults)
+    meshes = Meshes()
+    if mesh_lines:
+        from clrt.scene.mesh_lines import place_mesh_lines
+
+        meshes = place_mesh_lines(mesh_lines, triangles, len(objects), draft.materials, own, found, right_handed, faults)
     draft.materials += meshes.materials
     warnings += meshes.warnings
     objects, instances = build_instances((*objects, *meshes.objects), found, faults, meshes.named)
@@ -109,6 +119,15 @@ def parse_scene(
     if origins:
         scene = origins.relined(replace(scene, warnings=tuple(map(origins.told, scene.warnings))))
     return _mirrored(scene) if right_handed else scene
+
+
+def _mesh_lines(found: Declarations, folders: Folders, faults: Faults) -> list[MeshLine]:
+    """The files that mesh lines name, read; their readers are imported where there is one."""
+    if not any(call.name == "mesh" for call in found.words):
+        return []
+    from clrt.scene.mesh_lines import read_mesh_lines
+
+    return read_mesh_lines(found, folders, faults)
 
 
 def _light_warnings(draft: Draft, environment: Environment | None) -> list[str]:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from clrt.scene.faults import Faults, shown
 from clrt.scene.instances import turn
-from clrt.scene.model import FloatArray, Instance, Material, MeshObject, Texture
+from clrt.scene.meshes import Meshes
+from clrt.scene.model import FloatArray, Material, MeshObject
 from clrt.scene.models.gltf import moved
 from clrt.scene.models.load import read_model
 from clrt.scene.models.model_file import Model, ModelError, joined, shifted
@@ -30,21 +31,6 @@ class MeshLine:
     call: WordCall
     model: Model
     above: int
-
-
-@dataclass(eq=False)
-class Meshes:
-    """What the mesh lines of a text add, behind what it has itself: triangles behind its T lines, and so on.
-
-    named : line -> index of the object that the line gives a name
-    """
-
-    objects: list[MeshObject] = field(default_factory=list)
-    instances: list[Instance] = field(default_factory=list)
-    materials: list[Material] = field(default_factory=list)
-    textures: list[Texture] = field(default_factory=list)
-    named: dict[int, int] = field(default_factory=dict)
-    warnings: list[str] = field(default_factory=list)
 
 
 def read_mesh_lines(found: Declarations, folders: Folders, faults: Faults) -> list[MeshLine]:

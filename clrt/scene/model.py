@@ -306,7 +306,7 @@ class MeshObject:
         """The least and the greatest coordinates (3,) of its own triangles; zeros where there are none."""
         if not len(self):
             return np.zeros(3), np.zeros(3)
-        axes = [self.vertices[:, :, axis] for axis in range(3)]  # axis by axis: NumPy reduces few long rows much sooner than many short ones
+        axes = [self.vertices[:, :, axis] for axis in range(3)]  # NumPy reduces long rows much sooner than short ones
         return np.array([values.min() for values in axes]), np.array([values.max() for values in axes])
 
     @cached_property

@@ -11,7 +11,7 @@ import numpy as np
 
 from clrt.errors import SceneError
 from clrt.scene.model import Camera, FloatArray, Instance, Material, MeshObject, Scene
-from clrt.scene.models.gltf import EXTENSIONS, read_gltf
+from clrt.scene.models.gltf import read_gltf
 from clrt.scene.models.gltf_materials import default_material
 from clrt.scene.models.model_file import Model, ModelError, View
 from clrt.scene.models.place import SCENE_FROM_FILE, Placing, flat_warnings, placed
@@ -26,11 +26,6 @@ _FOV = 45.0  #: degrees from left to right, where there is no camera
 _FILL = 0.85  #: of the picture that the model then spans
 _MOST_POINTS = 1 << 22  #: of instances, that the view is fitted to one by one
 _VIEW = (-0.45, -0.35, 1.0)  #: from the front, the right and a little above
-
-
-def is_model(path: Path) -> bool:
-    """Whether a file of that name is a scene by itself."""
-    return path.suffix.lower() in EXTENSIONS
 
 
 def load_model_scene(path: Path, *, camera: int | None = None, allow_paths: Sequence[Path] = ()) -> Scene:

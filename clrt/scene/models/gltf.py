@@ -17,7 +17,6 @@ from clrt.scene.models.model_file import Model, ModelError, Part, View
 from clrt.scene.picture import Folders
 from clrt.scene.words.instances import MOST_SCALE
 
-EXTENSIONS = (".gltf", ".glb")
 _SAME_SCALE = 1e-6  #: relative difference of scales that counts as none: quaternions in files are rounded to float32
 
 

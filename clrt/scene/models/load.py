@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from clrt import mesh
-from clrt.scene.models import gltf
+from clrt.scene.models import GLTF_EXTENSIONS, gltf
 from clrt.scene.models.mesh_file import read_mesh_file
 from clrt.scene.models.model_file import Model, ModelError
 from clrt.scene.picture import Folders
 
-EXTENSIONS = (*mesh.EXTENSIONS, *gltf.EXTENSIONS)
+EXTENSIONS = (*mesh.EXTENSIONS, *GLTF_EXTENSIONS)
 
 
 def read_model(path: Path, allowed: Sequence[Path], *, materials: bool = True) -> Model:
@@ -24,7 +24,7 @@ def read_model(path: Path, allowed: Sequence[Path], *, materials: bool = True) -
     if extension not in EXTENSIONS:
         found = f"the extension {extension!r}" if extension else "no extension"
         raise ModelError(f"{found} is not one that is read; convert the mesh to one of {', '.join(EXTENSIONS)}")
-    if extension not in gltf.EXTENSIONS:
+    if extension not in GLTF_EXTENSIONS:
         return read_mesh_file(path, folders, materials)
     try:
         return gltf.read_gltf(path.read_bytes(), folders)
