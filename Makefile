@@ -26,7 +26,7 @@ lint: $(VENV)/dev.stamp ## ruff and mypy
 	$(BIN)/ruff check
 	$(BIN)/mypy --strict
 
-bench: $(VENV)/bench.stamp ## measure, into bench-results/; BENCH=--write-docs fills the tables of the documentation
+bench: $(VENV)/bench.stamp ## measure beside other tracers, into bench-results/; BENCH=--write-docs fills tables and plots of the documentation
 	$(BIN)/python -m clrt.bench $(BENCH)
 
 asm: $(VENV)/bench.stamp ## the compiled loops of the traversal, with counts of calls and spills; ASM="SCENE --precision exact" for others

@@ -230,7 +230,7 @@ def test_rates_of_peers_stand_beside_ratios_with_their_intervals() -> None:
 def test_growth_is_told_a_ray_and_a_triangle() -> None:
     triangles, _, objects, fits = tables_growth.growth_tables(bench_results.results()["growth"])
     assert triangles.rows[1] == ["100,000", "200.0 ms", "100.0 ms", "2", "2.00", "19.1 ns", "3.0 MiB", "1.00 GiB"]
-    assert [row[0] for row in objects.rows] == ["10 objects of 80 triangles", "10 instances of 80 triangles"]
+    assert [row[0] for row in objects.rows] == ["10 objects of 20 triangles", "10 instances of 20 triangles"]
     assert fits.rows == [["triangles", "2.00 ns", "+1.500 ns", "1.2%"]]
     assert "22.0 ns, 1.10 times" in fits.note
 

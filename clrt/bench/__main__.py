@@ -36,6 +36,7 @@ _STEP = 8  #: pixels
 @click.option("--rounds", type=click.IntRange(1), metavar="N", help="Of everything that takes turns; 6 or more give intervals.")
 @click.option("--largest", type=click.IntRange(1000, 10_000_000), metavar="N",
               help="Triangles at the end of the growth curve.  [default: 1000000]")
+@click.option("--objects", type=click.IntRange(1, 100_000), metavar="N", help="Objects at the end of theirs.  [default: 10000]")
 @click.option("--scenes", "folder", type=_FILE, metavar="FOLDER", help="Where rabbit.txt and monkey.txt are, instead of generated ones.")
 @click.option("--device", metavar="NAME", help="Part of the name of an OpenCL device.")
 @click.option("-o", "--out", type=_FILE, default=Path("bench-results"), show_default=True, metavar="FOLDER", help="Where the JSON goes.")
@@ -43,7 +44,7 @@ _STEP = 8  #: pixels
 @click.option("--write-docs", is_flag=True, help="Write tables and plots to docs/ and README.md.")
 def bench(
     quick: bool, only: tuple[str, ...], sizes: tuple[int, ...], rounds: int | None, largest: int | None,
-    folder: Path | None, device: str | None, out: Path, earlier: Path | None, write_docs: bool,
+    objects: int | None, folder: Path | None, device: str | None, out: Path, earlier: Path | None, write_docs: bool,
 ) -> None:  # fmt: skip
     """Measure clrt on this machine beside other tracers: rays a second, whole commands, trees, growth."""
     if write_docs and (quick or only):
@@ -53,14 +54,14 @@ def bench(
     if earlier is not None:
         results = export.read(earlier)
     else:
-        results = run(_plan(quick, sizes, rounds, largest), folder, device, quick, only or export.PARTS)
+        results = run(_plan(quick, sizes, rounds, largest, objects), folder, device, quick, only or export.PARTS)
         click.echo(f"kept in {export.save(results, out)}", err=True)
     report.print_results(results)
     if write_docs:
         click.echo(f"written: {', '.join(str(path) for path in export.write_docs(results, _ROOT))}", err=True)
 
 
-def _plan(quick: bool, sizes: tuple[int, ...], rounds: int | None, largest: int | None) -> measure.Plan:
+def _plan(quick: bool, sizes: tuple[int, ...], rounds: int | None, largest: int | None, objects: int | None) -> measure.Plan:
     plan = measure.QUICK if quick else measure.FULL
     if odd := [size for size in sizes if size % _STEP]:
         raise click.UsageError(f"a size of {odd[0]}: give a multiple of {_STEP}, the side of a group of packets")
@@ -68,7 +69,8 @@ def _plan(quick: bool, sizes: tuple[int, ...], rounds: int | None, largest: int 
         plan = replace(plan, view_sizes=tuple(sorted(set(sizes))))
     if rounds is not None:
         plan = replace(plan, rounds=rounds, peer_rounds=rounds, ladder_rounds=rounds, command_rounds=rounds)
-    return plan if largest is None else replace(plan, reach=replace(plan.reach, triangles=largest))
+    reach = {name: number for name, number in (("triangles", largest), ("separate", objects)) if number is not None}
+    return replace(plan, reach=replace(plan.reach, **reach))
 
 
 def run(plan: measure.Plan, folder: Path | None, device_name: str | None, quick: bool, parts: Sequence[str]) -> dict[str, Any]:

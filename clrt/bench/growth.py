@@ -24,7 +24,7 @@ class Reach:
 
     triangles: int = 1_000_000
     pixels: int = 4096
-    separate: int = 1_000
+    separate: int = 10_000
     instances: int = 100_000
     size: int = 1024
     rounds: int = 7

@@ -28,13 +28,13 @@ from clrt.device.context import Device, open_device
 from clrt.features import Features
 from clrt.generate import grid_mesh, uv_sphere
 from clrt.precision import DEFAULT, rung
-from clrt.renderer import Prepared, build_trees, fill_buffers, open_tracer
+from clrt.renderer import Prepared, build_trees, open_tracer
 from clrt.scene.model import Instance, Scene
 from clrt.timing import Series, interleave
 
 FloatArray = NDArray[np.float64]
 
-_SMALL = 80  #: triangles of each of many objects
+_SMALL = 20  #: triangles of each of many objects
 _HILLS = 100_000  #: triangles behind the curve of pixels
 _PATIENCE_S, _MOST = 2.0, 7  #: of building again and again; at least once
 
@@ -104,8 +104,7 @@ def _repeatedly(run: Callable[[], Prepared], most: int) -> tuple[Prepared, Serie
 
 def _traced(prepared: Prepared, device: Device, rounds: int) -> dict[str, Any]:
     features = Features.of(prepared.scene)
-    _, _, upload_s = fill_buffers(prepared, features, rung(DEFAULT), device)
-    buffers, tracer, _, _ = open_tracer(prepared, features, rung(DEFAULT), device, _silent)
+    buffers, tracer, _, upload_s = open_tracer(prepared, features, rung(DEFAULT), device, _silent)
     trace = interleave({"trace": lambda: tracer.run(0, tracer.height)}, rounds)["trace"]
     return {"upload_s": upload_s, "trace_s": trace.to_json(), "rays": tracer.width * tracer.height, "device_bytes": buffers.size}
 

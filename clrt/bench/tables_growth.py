@@ -8,7 +8,7 @@ from clrt.bench.growth import AXES
 from clrt.bench.table import Table, size
 from clrt.cli.report import seconds
 
-WORDS = {"triangles": "triangles", "pixels": "pixels", "separate": "objects of 80 triangles", "instances": "instances of 80 triangles"}
+WORDS = {"triangles": "triangles", "pixels": "pixels", "separate": "objects of 20 triangles", "instances": "instances of 20 triangles"}
 GROWTH_PLOT = "bench-growth"
 
 
