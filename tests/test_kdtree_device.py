@@ -171,10 +171,12 @@ def test_environment_chooses_who_builds(device: Device, monkeypatch: pytest.Monk
 def test_size_decides_by_itself(compiled: bool, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(choose.VARIABLE, raising=False)
     monkeypatch.setattr(choose, "compiled_before", lambda device: compiled)
-    assert not choose.on_device("sah", choose.READY_FROM - 1, device)
-    assert choose.on_device("sah", choose.READY_FROM, device) == compiled
-    assert choose.on_device("sah", choose.FRESH_FROM, device)
-    assert not choose.on_device("median", choose.FRESH_FROM, device)
+    assert not choose.on_device("sah", [choose.READY_FROM // 2], device)
+    assert choose.on_device("sah", [10, choose.READY_FROM], device) == compiled
+    assert choose.on_device("sah", [12] * (choose.READY_FROM // 100), device) == compiled
+    assert choose.on_device("sah", [choose.FRESH_FROM], device)
+    assert not choose.on_device("median", [choose.FRESH_FROM], device)
+    assert not choose.on_device("sah", [0] * choose.FRESH_FROM, device)
 
 
 def test_numpy_builds_with_a_note_where_the_device_fails(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -26,6 +26,7 @@ VARIABLE = "CLRT_TREES"
 WAYS = ("auto", "numpy", "device")
 READY_FROM = 16_000  #: triangles from which on kernels are sooner that only have to be loaded (docs/kdtree.md has the measurement)
 FRESH_FROM = 500_000  #: the same for kernels that have to be compiled
+_TREE = 150  #: triangles whose building takes NumPy as long as what every tree takes, even the smallest
 
 Tell = Callable[[float], None]
 
@@ -39,7 +40,7 @@ def build_trees(
     A RuntimeWarning tells why NumPy builds where the device was to. Raises MeshError, ClrtError for an unknown value of CLRT_TREES.
     """
     told = tell or (lambda fraction: None)
-    if device is not None and on_device(builder, sum(map(len, meshes)), device):
+    if device is not None and on_device(builder, [len(mesh) for mesh in meshes], device):
         try:
             return _by_device(meshes, origins, device, told)
         except (DeviceError, LimitError, MemoryError) as error:
@@ -47,17 +48,18 @@ def build_trees(
     return _by_numpy(meshes, origins, builder, told)
 
 
-def on_device(builder: str, triangles: int, device: Device) -> bool:
-    """Whether the device is to build trees over so many triangles in all."""
+def on_device(builder: str, counts: Sequence[int], device: Device) -> bool:
+    """Whether the device is to build trees over so many triangles each."""
     way = os.environ.get(VARIABLE) or "auto"
     if way not in WAYS:
         raise ClrtError(f"{VARIABLE}={way} is not known; use one of {', '.join(WAYS)}")
-    if builder != "sah" or not triangles or way == "numpy":
+    if builder != "sah" or not any(counts) or way == "numpy":
         return False
     if way == "device":
         return True
     # On anything but a processor a work-item alone, with a subtree to itself, is slow.
-    return is_processor(device) and triangles >= READY_FROM and (triangles >= FRESH_FROM or compiled_before(device))
+    work = sum(counts) + _TREE * len(counts)
+    return is_processor(device) and work >= READY_FROM and (work >= FRESH_FROM or compiled_before(device))
 
 
 def _by_numpy(meshes: Sequence[F64], origins: F64, builder: str, tell: Tell) -> tuple[list[KdTree], list[float]]:
