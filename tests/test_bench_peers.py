@@ -141,7 +141,7 @@ def test_a_script_makes_the_picture_that_clrt_makes(scene: Scene, tmp_path: Path
     commands.write_files(scene, tmp_path)
     written = clrt.load(tmp_path / "view.txt")
     assert [len(item) for item in written.objects] == [len(item) for item in scene.objects]
-    np.testing.assert_array_equal(written.objects[0].vertices, scene.objects[0].vertices.astype(np.float32))
+    np.testing.assert_array_equal(written.objects[0].vertices, scene.objects[0].vertices)
     clrt.render(written, size=(SIZE, SIZE)).save(commands.picture_of(commands.CLRT, tmp_path))
     found, _ = commands.programs(tmp_path, SIZE)
     trimesh = next(program for program in found if program.name == "trimesh")

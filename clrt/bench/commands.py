@@ -91,8 +91,8 @@ def programs(folder: Path, size: int) -> tuple[list[Program], list[Missing]]:
 
 
 def write_files(scene: Scene, folder: Path) -> None:
-    """view.txt for clrt, mesh.ply and view.json for the scripts, view.pov for POV-Ray: the same float32 triangles."""
-    objects = [item.vertices.astype(np.float32).astype(np.float64) for item in scene.objects]
+    """view.txt for clrt, mesh.ply and view.json for the scripts, view.pov for POV-Ray: the same triangles, rounded to float32 in PLY."""
+    objects = [item.vertices for item in scene.objects]
     camera, light = scene.camera, np.array(scene.lights[0].position)
     ahead = camera.corners.mean(axis=0)
     field = 2.0 * np.degrees(np.arctan(np.linalg.norm(camera.corners[1] - camera.corners[0]) / 2.0 / np.linalg.norm(ahead)))
