@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -124,3 +126,28 @@ def test_unwritable_folder_of_the_variable_is_named(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert f"PoCL cannot write to POCL_CACHE_DIR={folder}" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_empty_files_that_pocl_left_go_after_an_hour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
+    for name, size, age in (("tempfile_old001", 0, 4000), ("tempfile_new001", 0, 10), ("tempfile_full01", 5, 4000), ("notes", 0, 4000)):
+        (tmp_path / name).write_bytes(bytes(size))
+        os.utime(tmp_path / name, (time.time() - age,) * 2)
+    kernel_cache.choose_folder()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["notes", "tempfile_full01", "tempfile_new001"]
+
+
+def test_mark_stays_while_any_thread_loads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
+    mark = tmp_path / f"clrt-loading-{os.getpid()}"
+    with kernel_cache.loading():
+        thread = threading.Thread(target=_load_nothing)
+        thread.start()
+        thread.join()
+        assert mark.exists()
+    assert not mark.exists()
+
+
+def _load_nothing() -> None:
+    with kernel_cache.loading():
+        pass

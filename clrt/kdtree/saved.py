@@ -26,14 +26,19 @@ _PACKAGES = ("kdtree", "forest")  #: whose code makes trees, with the kernels bu
 Build = Callable[[Sequence[F64], F64], tuple[list[KdTree], list[float]]]
 
 
-@cache
-def code_digest() -> str:
-    """Of the version, and of all code that makes trees: another builder never meets trees of its forerunners."""
+def tree_code() -> list[Path]:
+    """The files that make trees."""
     package = Path(__file__).parents[1]
     files = [file for name in _PACKAGES for file in sorted((package / name).glob("*.py"))]
     for folder in (package / "kernels", package.parent / "kernels"):
         files += sorted(folder.glob("build_*.cl"))
-    return digest(__version__.encode(), *(file.read_bytes() for file in files))
+    return files
+
+
+@cache
+def code_digest() -> str:
+    """Of the version, and of all code that makes trees: another builder never meets trees of its forerunners."""
+    return digest(__version__.encode(), *(file.read_bytes() for file in tree_code()))
 
 
 def tree_key(vertices: F64, origin: NDArray[np.float64], builder: str) -> str:

@@ -1,0 +1,221 @@
+"""What a first picture costs beside tracing: modules imported, trees and kernels kept, threads. Counted, not timed."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clrt import renderer
+from clrt.device import ahead, program
+from clrt.device.context import POCL, Device
+from clrt.errors import DeviceError, LimitError
+from clrt.features import Features
+from clrt.kdtree.saved import LEAST_TRIANGLES
+from clrt.renderer import with_options
+from clrt.scene.build import parse_scene
+from clrt.tasks import Task
+
+HEAD = "E 0 0 -1\nV 0 0 1\nF 45\nR 32 24\nL 5 5 -5\nM 1 0.5 0.2 0.2 0.8 0 1 0\n"
+NOT_FOR_ALL = {  # what most renders of a scene text have no use for
+    "PIL", "rich", "trimesh", "scipy", "jinja2", "matplotlib", "OpenImageIO", "numpy.ma", "numpy.random", "clrt.adaptive.engine",
+    "clrt.scene.models.gltf", "clrt.mesh", "clrt.kdtree.coverage", "clrt.explain", "clrt.study", "clrt.verify", "clrt.bench",
+}  # fmt: skip
+
+
+def scene_text(triangles: int) -> str:
+    corners = np.random.default_rng(5).random((triangles, 1, 3)) * [2.0, 2.0, 1.0] + [-1.0, -1.0, 2.0]
+    corners = corners + 0.05 * np.random.default_rng(6).normal(size=(triangles, 3, 3))
+    return HEAD + "".join("T " + " ".join(f"{x:.6f}" for x in t.ravel()) + "\n" for t in corners)
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.txt"
+    path.write_text(scene_text(LEAST_TRIANGLES + 100))
+    return path
+
+
+def imported(code: str, folder: Path) -> set[str]:
+    """The modules that a process has imported at its end, however it ends."""
+    at_end = "def end(code):\n    print('\\n' + '\\n'.join(sys.modules), flush=True)\n    leave(code)\n"
+    program = f"import os, sys\nleave = os._exit\n{at_end}os._exit = end\n{code}\nend(0)"
+    environment = os.environ | {"XDG_CACHE_HOME": str(folder / "cache")}
+    done = subprocess.run([sys.executable, "-c", program], cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return set(done.stdout.split("\n"))
+
+
+def command(*arguments: str) -> str:
+    return f"sys.argv = {['clrt', *arguments]!r}\nfrom clrt.cli.entry import main\nmain()"
+
+
+def of_packages(modules: set[str]) -> set[str]:
+    """The packages of modules outside Python's own library."""
+    return {name.partition(".")[0] for name in modules} & {"numpy", "pyopencl", "PIL", "click", "rich", "trimesh", "scipy"}
+
+
+def test_import_of_clrt_imports_no_package(tmp_path: Path) -> None:
+    modules = imported("import clrt", tmp_path)
+    assert of_packages(modules) == set()
+    assert {name for name in modules if name.startswith("clrt")} == {"clrt", "clrt.errors"}
+
+
+@pytest.mark.parametrize("option", ["--help", "--version"])
+def test_help_imports_click_alone(tmp_path: Path, option: str) -> None:
+    modules = imported(command(option), tmp_path)
+    assert of_packages(modules) == {"click"}
+    assert "clrt.scene" not in modules
+
+
+def test_render_imports_what_the_scene_needs_alone(tmp_path: Path, scene: Path) -> None:
+    run = command(str(scene), "-o", str(tmp_path / "picture.png"))
+    modules = imported(run, tmp_path)
+    assert {"numpy", "pyopencl", "clrt.forest.choose"} <= modules
+    assert modules & NOT_FOR_ALL == set()
+    again = imported(run, tmp_path)
+    assert "clrt.forest.choose" not in again  # the tree was kept, so its builders are not even imported
+    assert again & NOT_FOR_ALL == set()
+
+
+def caches(folder: Path) -> dict[str, str]:
+    """The environment of a first run ever."""
+    return {"XDG_CACHE_HOME": str(folder), "POCL_CACHE_DIR": ""}
+
+
+def run(scene: Path, where: dict[str, str], picture: str, *options: str) -> dict[str, float]:
+    """Renders, and gives the figures of the run."""
+    arguments = [sys.executable, "-m", "clrt", str(scene), "-o", str(scene.parent / picture), "--stats", "-", *options]
+    done = subprocess.run(arguments, env=os.environ | where, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    figures: dict[str, float] = json.loads(done.stdout)
+    return figures
+
+
+def kept(cache: Path) -> set[str]:
+    return {str(file.relative_to(cache)) for file in (cache / "clrt").rglob("*") if file.is_file() and file.stat().st_size}
+
+
+@pytest.mark.usefixtures("device")  # whose kernels are kept where the environment of this process says from then on
+def test_picture_is_the_same_with_trees_of_an_earlier_run_broken_ones_and_none(tmp_path: Path, scene: Path) -> None:
+    where = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    first = run(scene, where, "first.png")
+    (entry,) = (tmp_path / "cache" / "clrt" / "trees").iterdir()
+    whole = entry.read_bytes()
+    again = run(scene, where, "again.png")
+    entry.write_bytes(whole[: len(whole) // 2])
+    broken = run(scene, where, "broken.png")
+    assert entry.read_bytes() == whole
+    none = run(scene, where, "none.png", "--no-cache")
+    pictures = {(tmp_path / f"{name}.png").read_bytes() for name in ("first", "again", "broken", "none")}
+    assert len(pictures) == 1
+    assert {(f["nodes"], f["depth"], f["tests_per_ray"]) for f in (first, again, broken, none)} == {
+        (first["nodes"], first["depth"], first["tests_per_ray"])
+    }
+
+
+def test_no_cache_leaves_nothing(tmp_path: Path, scene: Path) -> None:
+    cache, temporary = tmp_path / "cache", tmp_path / "temporary"
+    temporary.mkdir()
+    arguments = [sys.executable, "-m", "clrt", str(scene), "-o", str(tmp_path / "picture.png"), "--no-cache"]
+    subprocess.run(arguments, env=os.environ | caches(cache) | {"TMPDIR": str(temporary)}, capture_output=True, check=True)
+    assert (tmp_path / "picture.png").stat().st_size > 100
+    assert kept(cache) == set()
+    assert list(temporary.iterdir()) == []
+
+
+def test_fault_of_the_scene_is_said_before_anything_is_kept(tmp_path: Path, scene: Path) -> None:
+    scene.write_text(scene.read_text() + "T 1 2 x 4 5 6 7 8 9\n")
+    arguments = [sys.executable, "-m", "clrt", str(scene), "-o", str(tmp_path / "picture.png")]
+    done = subprocess.run(arguments, env=os.environ | caches(tmp_path / "cache"), capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"{scene}:")
+    assert "expected a number" in done.stderr
+    assert not (tmp_path / "picture.png").exists()
+    assert kept(tmp_path / "cache") == set()
+
+
+def test_unknown_device_is_said_as_without_threads(tmp_path: Path, scene: Path) -> None:
+    arguments = [sys.executable, "-m", "clrt", str(scene), "-o", str(tmp_path / "picture.png"), "--device", "no such device"]
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.startswith("clrt: error: no OpenCL device is called 'no such device'")
+    assert done.stderr.count("\n") == 1
+
+
+def test_program_that_was_begun_is_the_one_that_is_used(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The program that is guessed before there is a tree is the one that is needed: it is built once, and its kernels all at that time."""
+    sources: list[str] = []
+    built = program.build
+    monkeypatch.setattr(program, "build", lambda device, source, *more: (sources.append(source), built(device, source, *more))[1])
+    scene = parse_scene(scene_text(200))
+    renderer.render(scene, dump_kernel=tmp_path / "kernel.cl")
+    assert sources == [(tmp_path / "kernel.cl").read_text()]
+
+
+def test_kernels_are_compiled_for_the_sizes_of_later_launches(tmp_path: Path, scene: Path, device: Device) -> None:
+    """PoCL compiles a kernel for each kind of launch: once is enough for each."""
+    if device.info.platform != POCL:
+        pytest.skip("the default device is not PoCL's")
+    run(scene, caches(tmp_path / "cache"), "picture.png")
+    found = sorted(file.name for file in (tmp_path / "cache").rglob("*.so") if "render" in str(file) or "prepare" in str(file))
+    names = [name for name in found if not name.startswith("lib")]
+    assert names.count("prepare_planes.so") == names.count("prepare_triangles.so") == 1
+    assert names.count("render.so") == 2  # the picture's, and that of the pass that counts
+
+
+def test_error_of_the_compiler_comes_out_of_the_thread(device: Device) -> None:
+    compilation = ahead.Compilation(device, "kernel void render(global int *x) { x[0] = nothing; }", 1)
+    with pytest.raises(DeviceError, match="could not compile"):
+        ahead.build(device, compilation.source, compilation)
+
+
+def test_scene_without_room_on_the_stack_is_refused_before_anything_is_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(program, "PRIVATE_LIMIT", 1)
+    monkeypatch.setattr(program, "build", lambda *_: pytest.fail("something was compiled"))
+    with pytest.raises(LimitError, match="private memory"):
+        renderer.render(parse_scene(scene_text(3)))
+
+
+def test_shape_before_there_are_trees_is_the_shape_with_them() -> None:
+    scene = with_options(parse_scene(scene_text(3000)), None, None, None, 0)
+    features = Features.of(scene)
+    trees = renderer.build_trees(scene, "sah", lambda phase, fraction: None)
+    assert max(tree.depth for tree in trees.trees) > 5
+    assert renderer.program_shape(trees, features, True) == renderer.program_shape(renderer.Prepared(scene, (), ()), features, True)
+
+
+def test_task_gives_its_value_and_its_error() -> None:
+    caller = threading.get_ident()
+    assert Task(lambda: threading.get_ident()).result() != caller
+
+    def fail() -> None:
+        raise KeyError("x")
+
+    task = Task(fail)
+    for _ in range(2):
+        with pytest.raises(KeyError):
+            task.result()
+
+
+def test_task_is_over_when_an_error_leaves_its_block() -> None:
+    go, ended = threading.Event(), threading.Event()
+
+    def work() -> None:
+        go.wait(10)
+        ended.set()
+
+    def fail() -> None:
+        with Task(work):
+            threading.Timer(0.05, go.set).start()
+            raise ValueError("of the caller")
+
+    with pytest.raises(ValueError, match="of the caller"):
+        fail()
+    assert ended.is_set()
