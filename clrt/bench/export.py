@@ -10,7 +10,7 @@ from typing import Any
 
 from clrt.bench.plots import all_plots
 from clrt.bench.report import markdown, tables
-from clrt.bench.tables_peers import commands_table, versus_table
+from clrt.bench.tables_peers import commands_table, over_table, versus_table
 from clrt.bench.tables_trees import ladder_table, trees_table
 from clrt.errors import ClrtError
 from clrt.files import atomic_write, check_writable
@@ -75,7 +75,9 @@ def write_docs(results: dict[str, Any], root: Path) -> list[Path]:
         written[-1].parent.mkdir(exist_ok=True)
         with atomic_write(written[-1]) as file:
             file.write(plot.svg)
-    main = [versus_table(results["versus"]), commands_table(results["commands"]), trees_table(results["trees"])]
+    main = [
+        versus_table(results["versus"]), over_table(results["versus"]), commands_table(results["commands"]), trees_table(results["trees"])
+    ]  # fmt: skip
     chosen = ((page, tables(results)), (readme, main), (numerics, [ladder_table(results["ladder"])]))
     for path, shown in chosen:
         text = markdown(results, shown, 3, "images" if path is page else None)

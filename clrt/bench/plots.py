@@ -12,7 +12,7 @@ from clrt.bench.growth import curve
 from clrt.bench.tables_growth import GROWTH_PLOT, WORDS
 from clrt.bench.tables_peers import RAYS_PLOT
 from clrt.precision import DEFAULT
-from clrt.study.report_plots import BLUE, GREEN, GREY, ORANGE, PURPLE, Plot, draw, style
+from clrt.study.report_plots import BLUE, GREEN, GREY, ORANGE, PURPLE, Plot, draw, halo, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,8 +42,8 @@ def _draw_rays(figure: Figure, versus: Mapping[str, Any]) -> str:
             values = [row["rates"][name][kind] for name in names]
             axes.barh(place + shift, values, _BAR, color=colour, zorder=2, label=f"{kind} rays" if row is views[0] else None)
             for y, value in zip(place + shift, values, strict=True):
-                axes.annotate(f"{value:.0f}" if value >= 10 else f"{value:.1f}", (value, y), (3, 0), textcoords="offset points",
-                              va="center", fontsize=8.5)  # fmt: skip
+                text = f"{value:.0f}" if value >= 10 else f"{value:.1f}"
+                halo(axes.annotate(text, (value, y), (3, 0), textcoords="offset points", va="center", fontsize=8.5, zorder=3))
         axes.set_yticks(place, [name.replace(own, f"clrt, {DEFAULT}") for name in names])
         axes.tick_params(axis="y", length=0)
         axes.set_title(f"{row['size']} x {row['size']}", loc="left", fontsize=10.5)
@@ -56,8 +56,8 @@ def _draw_rays(figure: Figure, versus: Mapping[str, Any]) -> str:
 def _draw_growth(figure: Figure, growth: Mapping[str, Any]) -> str:
     """Time a ray against triangles and objects with the fitted curves, against pixels; building; memory."""
     (rays, objects), (building, memory) = figure.subplots(2, 2)
-    _curves(rays, growth, ("triangles", "pixels"), "triangles or pixels")
-    _curves(objects, growth, ("separate", "instances"), "objects or instances")
+    _curves(rays, growth, ("triangles", "pixels"), "triangles or pixels", "Time a ray by triangles, by pixels")
+    _curves(objects, growth, ("separate", "instances"), "objects or instances", "Time a ray by objects, by instances")
     triangles = [row for row in growth["points"] if row["kind"] == "triangles"]
     x = np.array([row["triangles"] for row in triangles])
     _powers(building, x, {"build": (BLUE, "o", [row["build_s"]["best"] for row in triangles]),
@@ -71,7 +71,7 @@ def _draw_growth(figure: Figure, growth: Mapping[str, Any]) -> str:
     return "Growth with triangles, pixels and objects."
 
 
-def _curves(axes: Axes, growth: Mapping[str, Any], kinds: tuple[str, ...], x_name: str) -> None:
+def _curves(axes: Axes, growth: Mapping[str, Any], kinds: tuple[str, ...], x_name: str, title: str) -> None:
     for kind in kinds:
         numbers, values = curve(growth["points"], kind)
         axes.plot(numbers, values, color=_COLOURS[kind], marker=_MARKERS[kind], markersize=5, linewidth=0.8, label=WORDS[kind])
@@ -84,7 +84,7 @@ def _curves(axes: Axes, growth: Mapping[str, Any], kinds: tuple[str, ...], x_nam
     axes.set_ylim(0.0, 1.35 * axes.get_ylim()[1])  # room for the legend
     axes.grid()
     axes.legend(fontsize=8)
-    axes.set_title("Time a ray", loc="left")
+    axes.set_title(title, loc="left")
 
 
 def _powers(axes: Axes, x: NDArray[np.int64], lines: Mapping[str, tuple[str, str, list[float]]]) -> None:

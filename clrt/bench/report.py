@@ -13,6 +13,7 @@ from clrt.bench.tables_peers import (
     general_table,
     imports_table,
     incoherent_table,
+    over_table,
     rungs_table,
     versus_table,
 )
@@ -32,7 +33,8 @@ def tables(results: dict[str, Any]) -> list[Table]:
     if results["marks"]:
         found.append(marks_table(results["marks"]))
     if "versus" in results:
-        found += [versus_table(results["versus"]), rungs_table(results["versus"]), general_table(results["versus"]["general"])]
+        found += [make(results["versus"]) for make in (versus_table, over_table, rungs_table)]
+        found.append(general_table(results["versus"]["general"]))
     makers: dict[str, Callable[[Any], Table]] = {
         "incoherent": incoherent_table, "commands": commands_table, "imports": imports_table, "trees": trees_table, "ladder": ladder_table,
         "tests": tests_table, "programs": programs_table,

@@ -14,18 +14,30 @@ RAYS_PLOT = "bench-rays"
 
 
 def versus_table(versus: dict[str, Any]) -> Table:
-    """Million rays a second of clrt's default rung and of every peer, and what the one has over the others."""
-    names = list(dict.fromkeys(name for row in versus["views"] for name in row["ratios"]))
+    """Million rays a second of clrt's default rung and of every peer."""
+    names = _peers(versus)
     cells = [
-        [f"{row['size']}²", _KIND_WORDS[kind], f"**{row['rates'][f'clrt {DEFAULT}'][kind]:.1f}**", *(_beside(row, kind, n) for n in names)]
+        [f"{row['size']}²", _KIND_WORDS[kind], f"**{row['rates'][f'clrt {DEFAULT}'][kind]:.1f}**",
+         *(f"{row['rates'][name][kind]:.1f}" if name in row["rates"] else "-" for name in names)]
         for row in versus["views"] for kind in KINDS
     ]  # fmt: skip
     headings = ["size", f"{versus['scene']}, million a second", f"clrt, {DEFAULT}", *names]
-    return Table("Rays a second, against other tracers", headings, cells, words=2, note=_versus_note(versus), image=RAYS_PLOT)
+    return Table("Rays a second, beside other tracers", headings, cells, words=2, note=_versus_note(versus), image=RAYS_PLOT)
 
 
-def _beside(row: dict[str, Any], kind: str, name: str) -> str:
-    return f"{row['rates'][name][kind]:.1f}; {interval(row['ratios'][name][kind])}" if name in row["ratios"] else "-"
+def over_table(versus: dict[str, Any]) -> Table:
+    """How many times as fast as each peer clrt is."""
+    names = _peers(versus)
+    cells = [
+        [f"{row['size']}²", _KIND_WORDS[kind], *(interval(row["ratios"][n][kind]) if n in row["ratios"] else "-" for n in names)]
+        for row in versus["views"] for kind in KINDS
+    ]  # fmt: skip
+    note = "The median of the ratios of each round, and an interval that holds the true one with 95%."
+    return Table(f"How many times as fast clrt is, {DEFAULT}", ["size", "over", *names], cells, words=2, note=note)
+
+
+def _peers(versus: dict[str, Any]) -> list[str]:
+    return list(dict.fromkeys(name for row in versus["views"] for name in row["ratios"]))
 
 
 def _versus_note(versus: dict[str, Any]) -> str:
@@ -33,9 +45,8 @@ def _versus_note(versus: dict[str, Any]) -> str:
     versions = ", ".join(f"{name} {version}" for name, version in versus["peers"]["versions"].items())
     used = ", ".join(f"{name} {value:.2f}" for name, value in cores_by_tracer(last["cores_used"]).items())
     note = (
-        f"The bench view: {versus['triangles']:,} triangles, one light; {last['hit_share']:.0%} of the camera's rays hit. Rates by the "
-        "median of rounds in turns; behind a peer's rate, how many times as fast clrt is: the median of the ratios of each round, and an "
-        f"interval that holds the true one with 95%. Peers: {versions or 'none'}. Cores in use: {used}."
+        f"The bench view: {versus['triangles']:,} triangles, one light; {last['hit_share']:.0%} of the camera's rays hit. By the median "
+        f"of rounds in turns. Peers: {versions or 'none'}. Cores in use: {used}."
     )
     if "pixels_that_differ" in last:
         differ = last["pixels_that_differ"]
