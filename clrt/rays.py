@@ -20,7 +20,7 @@ from clrt.device.blocks import WideArrays, wide_arrays
 from clrt.device.context import open_device
 from clrt.device.pack import local_origin, pack
 from clrt.device.packed import Packed
-from clrt.device.ray_sort import FEWEST, RaySorter
+from clrt.device.ray_sort import FEWEST, RaySorter, in_order_already
 from clrt.device.session import Buffers, StageCounter
 from clrt.features import Features
 from clrt.forest.choose import build_trees
@@ -168,7 +168,7 @@ class RayCaster:
         cl.enqueue_copy(queue, self._result, starts.astype(np.int32))
         found, records = self._buffers.empty(8 * len(hits)), self._records(hits)
         self._cast_kernel.set_arg(_HIT_LIST, found)
-        self._launch(given, part.stop - part.start, _LIST)
+        self._launch(given, part.stop - part.start, _LIST, self._worth_sorting(rays, part))
         self._cast_kernel.set_arg(_HIT_LIST, None)  # later launches must not meet a buffer that is gone
         size = (-(-len(hits) // _LOCAL) * _LOCAL,)
         self._list_kernel(queue, size, (_LOCAL,), self._buffers.vertices, self._sources, *given, found, records, np.int32(len(hits)))
@@ -187,6 +187,8 @@ class RayCaster:
             slots, size = buffers.upload(wide.slots), (-(-wide.slots.size // _LOCAL) * _LOCAL,)
             kernel = cl.Kernel(built, "prepare_blocks")
             kernel(self._device.queue, size, (_LOCAL,), buffers.triangles, slots, self._blocks, np.int32(wide.slots.size))
+            kernel, count = cl.Kernel(built, "prepare_boxes"), wide.nodes["child"].size
+            kernel(self._device.queue, (-(-count // _LOCAL) * _LOCAL,), (_LOCAL,), self._wide, self._blocks, np.int32(count))
             self._device.queue.finish()
 
     def _set_arguments(self, built: Any) -> None:
@@ -205,7 +207,7 @@ class RayCaster:
         self._cast_kernel.set_arg(_HIT_LIST, None)
         corners = packed.vertices.reshape(-1, 3)
         lo, hi = (corners.min(axis=0), corners.max(axis=0)) if len(corners) else (np.zeros(3), np.zeros(3))
-        self._sorter = RaySorter(buffers, built, lo, hi)
+        self._sorter, self._size = RaySorter(buffers, built, lo, hi), float((hi - lo).max()) / self._scale
 
     def _cast(self, rays: RayArrays, mode: int, hits: NDArray[np.void] | None = None) -> Iterator[slice]:
         """Casts a chunk after the other; gives the rays whose results are on the device, or, for _FIRST, in `hits`."""
@@ -219,7 +221,7 @@ class RayCaster:
             given = self._load(rays, part)
             records = None if hits is None else self._records(hits[part])
             self._cast_kernel.set_arg(_RECORDS, records)
-            self._launch(given, part.stop - part.start, mode)
+            self._launch(given, part.stop - part.start, mode, self._worth_sorting(rays, part))
             if hits is not None:
                 self._fetch(records, hits[part])
             yield part
@@ -239,10 +241,14 @@ class RayCaster:
             self._cast_kernel.set_arg(_RESULT, self._result)
         return given
 
-    def _launch(self, given: tuple[Any, ...], count: int, mode: int) -> None:
+    def _worth_sorting(self, rays: RayArrays, part: slice) -> bool:
+        return part.stop - part.start >= FEWEST and not in_order_already(rays.origins[part], rays.directions[part], self._size)
+
+    def _launch(self, given: tuple[Any, ...], count: int, mode: int, ordered: bool) -> None:
+        """`ordered`: trace in the sorter's order."""
         import pyopencl as cl
 
-        self._cast_kernel.set_arg(_ORDER, self._sorter.order(given, count) if count >= FEWEST else None)
+        self._cast_kernel.set_arg(_ORDER, self._sorter.order(given, count) if ordered else None)
         self._cast_kernel.set_arg(_RAYS, np.int32(count))
         self._cast_kernel.set_arg(_MODE, np.int32(mode))
         cl.enqueue_nd_range_kernel(self._device.queue, self._cast_kernel, (-(-count // program.RUN),), (1,))

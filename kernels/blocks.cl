@@ -48,18 +48,22 @@ typedef struct {
     int order_shift;  // of the ray's octant, in `order`
 } WideRay;
 
-// Children of a node that the ray may meet before t_max, a bit each, with their distances; all in order from near to far.
-HOT uint node_children(global const WideNode *node, const WideRay *ray, real t_min, real t_max, block_n *distance, block_int *child) {
-#pragma OPENCL FP_CONTRACT ON
-#define row(n) load_block(node->planes[n])
-    block_n enter = max_block(row(ray->enter[0]) * ray->inverse[0] + ray->enter_shift[0], (block_n)t_min);
-    block_n leave = min_block(row(ray->enter[0] ^ 1) * ray->inverse[0] + ray->leave_shift[0], (block_n)t_max);
-    enter = max_block(row(ray->enter[1]) * ray->inverse[1] + ray->enter_shift[1], enter);
-    leave = min_block(row(ray->enter[1] ^ 1) * ray->inverse[1] + ray->leave_shift[1], leave);
-    enter = max_block(row(ray->enter[2]) * ray->inverse[2] + ray->enter_shift[2], enter);
-    leave = min_block(row(ray->enter[2] ^ 1) * ray->inverse[2] + ray->leave_shift[2], leave);
-#undef row
-    const block_int order = *(global const block_int *)node->order >> ray->order_shift, children = *(global const block_int *)node->child;
+HOT real wide_ray(global const Object *object, const Rays *rays, WideRay *ray) {
+    const real reach = rays_reach(rays, object), pad = (R(8.0) * UNIT_ROUNDOFF) * reach;
+    ray->order_shift = 4 * (int)rays->octant;
+    for (int a = 0; a < 3; a++) {
+        const real slab = pad * abs_n(rays->inverse[a]), away = -(rays->origin[a] * rays->inverse[a]);
+        ray->inverse[a] = rays->inverse[a];
+        ray->enter_shift[a] = away - slab;
+        ray->leave_shift[a] = away + slab;
+        ray->enter[a] = 2 * a + (((int)rays->octant >> a) & 1);
+    }
+    return reach;
+}
+
+// Children that are not left before they are entered, a bit each, with the distances; all in order from near to far.
+HOT uint children_in_order(global const WideNode *node, int order_shift, block_n enter, block_n leave, block_n *distance, block_int *child) {
+    const block_int order = *(global const block_int *)node->order >> order_shift, children = *(global const block_int *)node->child;
 #if BLOCK == 16 && REAL_BITS == 32 && defined(__AVX512DQ__) && defined(__clang__)
     *child = __builtin_ia32_permvarsi512(children, order);
     *distance = __builtin_ia32_permvarsf512(enter, order);
@@ -81,6 +85,20 @@ HOT uint node_children(global const WideNode *node, const WideRay *ray, real t_m
     *child = PASTE(vload, BLOCK)(0, number);
     return found;
 #endif
+}
+
+// Children of a node that the ray may meet before t_max.
+HOT uint node_children(global const WideNode *node, const WideRay *ray, real t_min, real t_max, block_n *distance, block_int *child) {
+#pragma OPENCL FP_CONTRACT ON
+#define row(n) load_block(node->planes[n])
+    block_n enter = max_block(row(ray->enter[0]) * ray->inverse[0] + ray->enter_shift[0], (block_n)t_min);
+    block_n leave = min_block(row(ray->enter[0] ^ 1) * ray->inverse[0] + ray->leave_shift[0], (block_n)t_max);
+    enter = max_block(row(ray->enter[1]) * ray->inverse[1] + ray->enter_shift[1], enter);
+    leave = min_block(row(ray->enter[1] ^ 1) * ray->inverse[1] + ray->leave_shift[1], leave);
+    enter = max_block(row(ray->enter[2]) * ray->inverse[2] + ray->enter_shift[2], enter);
+    leave = min_block(row(ray->enter[2] ^ 1) * ray->inverse[2] + ray->leave_shift[2], leave);
+#undef row
+    return children_in_order(node, ray->order_shift, enter, leave, distance, child);
 }
 
 // The triangles of a block that triangle_test may accept, by its formulae (triangle.cl) term by term: all of them but those, and those that it
@@ -140,17 +158,25 @@ HOT void block_hits(const Geometry *geometry, global const Block *block, const R
         triangle_test(geometry, rays, reach, block->slot[lowest_bit(bits)], 0, ALL_LANES, hits);
 }
 
+// The nearest child left to see, of the deepest node that has any, if it is entered before t_max; false where there is none.
+HOT int next_child(const block_n *distances, const block_int *children, uint *pending, real t_max, int *level, int *node) {
+    real distance;
+    do {
+        if (*level == 0) return 0;
+        const int above = *level - 1;
+        const uint bits = pending[above], rest = bits & (bits - 1);
+        const int next = lowest_bit(bits);
+        *node = ((const int *)(children + above))[next];
+        distance = ((const real *)(distances + above))[next];
+        pending[above] = rest;
+        *level -= rest == 0;
+    } while (distance > t_max);
+    return 1;
+}
+
 HOT void blocks_trace(const Geometry *geometry, global const Object *object, const Rays *rays, const int any_hit, Hits *hits) {
-    const real reach = rays_reach(rays, object), pad = (R(8.0) * UNIT_ROUNDOFF) * reach;
     WideRay ray;
-    ray.order_shift = 4 * (int)rays->octant;
-#define axis(a)                                                             \
-    ray.inverse[a] = rays->inverse[a];                                      \
-    ray.enter_shift[a] = -(rays->origin[a] * rays->inverse[a]) - pad * abs_n(rays->inverse[a]); \
-    ray.leave_shift[a] = -(rays->origin[a] * rays->inverse[a]) + pad * abs_n(rays->inverse[a]); \
-    ray.enter[a] = 2 * a + (((int)rays->octant >> a) & 1);
-    axis(0) axis(1) axis(2)
-#undef axis
+    const real reach = wide_ray(object, rays, &ray);
     // Nodes with children left to see: which, and their distances.
     block_n distances[STACK_SIZE];
     block_int children[STACK_SIZE];
@@ -164,16 +190,7 @@ HOT void blocks_trace(const Geometry *geometry, global const Object *object, con
             block_hits(geometry, geometry->blocks + (-1 - node), rays, reach, hits);
             if (any_hit && hits->slot >= 0) return;
         }
-        real distance;
-        do {
-            if (level == 0) return;
-            const uint bits = pending[level - 1];
-            const int next = lowest_bit(bits);
-            node = ((const int *)(children + level - 1))[next];
-            distance = ((const real *)(distances + level - 1))[next];
-            pending[level - 1] = bits & (bits - 1);
-            level -= (bits & (bits - 1)) == 0;
-        } while (distance > hits->t);
+        if (!next_child(distances, children, pending, hits->t, &level, &node)) return;
     }
 }
 
@@ -200,6 +217,15 @@ kernel void prepare_blocks(global const Triangle *triangles, global const int *s
     block->bound[lane] = triangle->bound;
     block->normal_bound[lane] = triangle->normal_bound;
     block->slot[lane] = slot;
+}
+
+// The box of each block, from the node that it is a child of.
+kernel void prepare_boxes(global const WideNode *wide, global Block *blocks, int count) {
+    const int i = get_global_id(0), lane = i % BLOCK;
+    if (i >= count) return;
+    global const WideNode *node = wide + i / BLOCK;
+    if (node->child[lane] >= 0) return;
+    for (int p = 0; p < 6; p++) blocks[-1 - node->child[lane]].box[p] = node->planes[p][lane];
 }
 
 //@hook geometry_members

@@ -1,5 +1,5 @@
 // Provides: kernels cast (arrays of rays: first, any, all hits or their number) and cast_list (the records of all hits).
-// Needs: blocks.cl, given.cl, hit_record.cl, structs.  Reads: RUN (rays a work-item).
+// Needs: bundle.cl, given.cl, hit_record.cl, structs.  Reads: RUN (rays a work-item).
 //
 // A ray is traced with its direction at unit length and its origin relative to the local origin, rounded to `real`: both within the errors
 // that triangle.cl and box.cl allow for.
@@ -23,6 +23,24 @@ HOT void ray_begin(const GivenRay *ray, int good, const Geometry *geometry, real
     rays->active = good ? -1 : 0;
     rays->given = ray;
     rays_prepare(rays, extent);
+}
+
+// How many hits a ray has: one is sought after the other, in the order of t and id, until there is no further one. Listed where that is asked for.
+HOT int hits_in_order(const Geometry *geometry, Rays *ray, int number, int listed, global const int *begin, global int2 *list) {
+    int found = 0;
+    while (found <= geometry->slot_count) {
+        Hits hits;
+        hits.t = ray->t_max;
+        hits.slot = -1;
+        //@ hits_begin
+        scene_trace(geometry, ray, 0, 0, &hits);
+        if (hits.slot < 0) break;
+        if (listed) list[begin[number] + found] = (int2)(hits.slot, number);
+        found++;
+        ray->after = hits.slot;
+        ray->after_t = hits.t;
+    }
+    return found;
 }
 
 // Rays [0, count) of the given arrays, in the order `order` where there is one. By number: for FIRST_HIT the records of hits; else, in `result`,
@@ -57,33 +75,37 @@ void cast(global const WideNode *wide, global const Block *blocks, global const 
     //@ begin
     // Three loops, as memory that one ray waits for is then asked for while others are at work.
     GivenRay run[RUN];
-    int good[RUN], slot[RUN];
-    for (int i = first; i < end; i++) good[i - first] = ray_given_scaled(&given, order ? order[i] : i, run + i - first);
+    Rays rays[RUN];
+    Hits found[RUN];
+    int tally[RUN];
+    for (int i = first; i < end; i++) {
+        const int good = ray_given_scaled(&given, order ? order[i] : i, run + i - first);
+        ray_begin(run + i - first, good, &geometry, extent, rays + i - first);
+    }
+    for (int i = first; i < end; i++) {
+        if (order && i + RUN < count) ray_given_ahead(&given, order[i + RUN]);
+        if (mode == FIRST_HIT) fetch_ahead(records + (order ? order[i] : i), sizeof(HitRecord), 1);
+        Hits hits;
+        hits.t = rays[i - first].t_max;
+        hits.slot = -1;
+        //@ hits_begin
+        found[i - first] = hits;
+        tally[i - first] = 0;
+    }
+    const int bundle = mode < COUNT_HITS && bundle_coherent(rays, end - first, extent);
+    if (bundle) bundle_trace(&geometry, rays, end - first, mode == ANY_HIT, found);
+    for (int i = first; !bundle && i < end; i++) {
+        Rays *ray = rays + i - first;
+        if (!ray->active) continue;
+        if (mode < COUNT_HITS) scene_trace(&geometry, ray, 0, mode == ANY_HIT, found + i - first);
+        else tally[i - first] = hits_in_order(&geometry, ray, order ? order[i] : i, mode == LIST_HITS, result, list);
+    }
     for (int i = first; i < end; i++) {
         const int number = order ? order[i] : i;
-        if (order && i + RUN < count) ray_given_ahead(&given, order[i + RUN]);
-        if (mode == FIRST_HIT) fetch_ahead(records + number, sizeof(HitRecord), 1);
-        Rays rays;
-        Hits hits;
-        ray_begin(run + i - first, good[i - first], &geometry, extent, &rays);
-        // To count or list, one hit is sought after the other, in the order of t and id, until there is no further one.
-        int found = 0;
-        while (found <= slot_count) {
-            hits.t = rays.t_max;
-            hits.slot = -1;
-            //@ hits_begin
-            if (rays.active) scene_trace(&geometry, &rays, 0, mode == ANY_HIT, &hits);
-            if (mode < COUNT_HITS || hits.slot < 0) break;
-            if (mode == LIST_HITS) list[result[number] + found] = (int2)(hits.slot, number);
-            found++;
-            rays.after = hits.slot;
-            rays.after_t = hits.t;
-        }
-        if (mode == ANY_HIT || mode == COUNT_HITS) result[number] = mode == COUNT_HITS ? found : (int)hits.slot;
-        slot[i - first] = hits.slot;
+        if (mode == FIRST_HIT) hit_record(vertices, sources, run + i - first, found[i - first].slot, records + number);
+        else if (mode == ANY_HIT) result[number] = (int)found[i - first].slot;
+        else if (mode == COUNT_HITS) result[number] = tally[i - first];
     }
-    if (mode != FIRST_HIT) return;
-    for (int i = first; i < end; i++) hit_record(vertices, sources, run + i - first, slot[i - first], records + (order ? order[i] : i));
 }
 
 // The records of the `count` hits in `list`.

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from ray_meshes import MESHES
 
 import clrt
 from clrt.device import program, ray_sort
@@ -78,18 +79,18 @@ def test_rays_that_are_none_are_sorted_too(caster: clrt.RayCaster) -> None:
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("rung", list(RUNGS))
-def test_sorted_and_unsorted_answers_are_the_same_bits(rung: str, dtype: type, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sorted_and_unsorted_answers_are_the_same_bits(rung: str, dtype: type[np.floating], monkeypatch: pytest.MonkeyPatch) -> None:
     caster = clrt.RayCaster(rabbit_like(1000), precision=rung)
     with np.errstate(over="ignore", under="ignore"):
         origins, directions = (a.astype(dtype) for a in scattered(6000, 2))
     limits = np.random.default_rng(3).uniform(0.1, 3.0, 6000)
     limits[::7] = np.nan
-    answers = []
+    answers: list[list[bytes]] = []
     for fewest in (1 << 30, 1):
         monkeypatch.setattr("clrt.rays.FEWEST", fewest)
         calls = (caster.first_hit, caster.any_hit, caster.count_hits)
         answers.append([call(origins, directions, -0.1, limits).tobytes() for call in calls])
-        answers[-1].append(str(caster.counters))
+        answers[-1].append(str(caster.counters).encode())
         answers[-1] += [part.tobytes() for part in caster.all_hits(origins, directions, -0.1, limits)]
     assert answers[0] == answers[1]
     assert np.count_nonzero(caster.first_hit(origins, directions)["prim_id"] >= 0) > 300
@@ -99,10 +100,46 @@ def test_a_batch_large_enough_is_sorted_by_itself(caster: clrt.RayCaster, monkey
     origins, directions = scattered(ray_sort.FEWEST, 4)
     asked: list[int] = []
     order = caster._sorter.order
-    monkeypatch.setattr(caster._sorter, "order", lambda given, count: asked.append(count) or order(given, count))
+
+    def counted(given: Any, count: int) -> Any:
+        asked.append(count)
+        return order(given, count)
+
+    monkeypatch.setattr(caster._sorter, "order", counted)
     whole = caster.first_hit(origins, directions)
     assert caster.first_hit(origins[:-1], directions[:-1]).tobytes() == whole[:-1].tobytes()
     assert asked == [ray_sort.FEWEST]
+
+
+def view(side: int, spread: float) -> tuple[Array, Array]:
+    """Rays of a camera, row by row, whose origins are strewn about the eye."""
+    rng = np.random.default_rng(6)
+    across, down = np.meshgrid(*2 * [np.linspace(-0.7, 0.7, side)])
+    directions = np.stack([across, down, np.full_like(across, -2.0)], axis=-1).reshape(-1, 3)
+    return np.array([0.0, 0.0, 3.0]) + spread * rng.normal(size=directions.shape), directions
+
+
+@pytest.mark.parametrize("spread", [0.0, 1e-3, 0.05])
+@pytest.mark.parametrize("name", ["rabbit", "sphere", "grid on a lattice"])
+@pytest.mark.parametrize("rung", list(RUNGS))
+def test_neighbours_that_are_traced_as_a_bundle_answer_as_alone(rung: str, name: str, spread: float) -> None:
+    """In their order, rays of a camera form bundles; dealt out at random, they do not."""
+    casters = clrt.RayCaster(MESHES[name](), precision=rung)
+    origins, directions = view(120, spread)  # 32 rays in a row spread by less than bundle.cl allows
+    origins[1000], directions[2000], directions[3000] = np.nan, 0.0, [0.0, 0.0, 1.0]
+    dealt = np.random.default_rng(7).permutation(len(origins))
+    for call in (casters.first_hit, casters.any_hit):
+        alone = call(origins[dealt], directions[dealt])
+        assert call(origins, directions)[dealt].tobytes() == alone.tobytes()
+    assert np.count_nonzero(casters.any_hit(origins, directions)) > 100
+
+
+def test_rays_of_a_camera_are_in_order_and_scattered_ones_are_not() -> None:
+    assert ray_sort.in_order_already(*view(200, 0.0), 1.0)
+    assert ray_sort.in_order_already(*view(200, 1e-3), 1.0)
+    assert not ray_sort.in_order_already(*view(200, 1.0), 1.0)
+    assert not ray_sort.in_order_already(*scattered(40_000, 8), 1.0)
+    assert not ray_sort.in_order_already(np.full((40_000, 3), np.nan), np.full((40_000, 3), np.nan), 1.0)
 
 
 @pytest.mark.parametrize("width", [4, 8, 16])
@@ -116,4 +153,6 @@ def test_blocks_of_any_width_without_instructions_of_their_own_answer_the_same(
     compose = program.compose
     monkeypatch.setattr(program, "compose", lambda *a, **k: "#undef __AVX512DQ__\n#undef __AVX__\n" + compose(*a, **k))
     monkeypatch.setattr(Precision, "lanes", lambda self, float_lanes: width)
-    assert clrt.RayCaster(mesh, precision=rung).first_hit(origins, directions).tobytes() == expected.tobytes()
+    caster = clrt.RayCaster(mesh, precision=rung)
+    assert caster.first_hit(origins, directions).tobytes() == expected.tobytes()
+    assert caster.any_hit(*view(50, 0.0)).tolist() == [t < np.inf for t in caster.first_hit(*view(50, 0.0))["t"]]

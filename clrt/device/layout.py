@@ -117,10 +117,12 @@ def wide_node(real: type, width: int) -> np.dtype[np.void]:
 
 
 def block(real: type, width: int) -> np.dtype[np.void]:
-    """Triangles side by side: the members of `triangle`, and the slot of each. 1 KiB for 16 in float32."""
+    """Triangles side by side: the members of `triangle`, the slot of each; and the planes of their box. 1 KiB for 16 in float32."""
     vector: Any = (real, (3, width))
+    words = np.dtype(real).itemsize // 4  # every row is as long as the others, so that all are aligned
     return struct_dtype([("v0", *vector), ("e1", *vector), ("e2", *vector), ("normal", *vector), ("bound", real, (width,)),
-                         ("normal_bound", real, (width,)), ("slot", np.int32, (width,)), ("unused", np.int32, (width,))])  # fmt: skip
+                         ("normal_bound", real, (width,)), ("slot", np.int32, (width * words,)),
+                         ("box", real, (max(8, width),))])  # fmt: skip
 
 
 _F8_VECTOR: Any = (np.float64, (3,))

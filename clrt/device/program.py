@@ -35,7 +35,7 @@ _TREES = ("box.cl",)
 #: entry point -> files before effects that the traversal calls, between those and other effects, after all
 _ENTRIES = {
     "render": (("kdtree.cl", "hit.cl"), ("scene.cl", "surface.cl"), ("camera.cl", "prepare.cl", "render.cl")),
-    "cast": (("given.cl",), ("blocks.cl",), ("after.cl", "prepare.cl", "hit_record.cl", "cast.cl", "ray_sort.cl")),
+    "cast": (("given.cl",), ("blocks.cl", "bundle.cl"), ("after.cl", "prepare.cl", "hit_record.cl", "cast.cl", "ray_sort.cl")),
 }
 PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a packet, width and height
 TILE = (16, 8)  #: pixels of a tile, width and height: whole packets of any size

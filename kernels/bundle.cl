@@ -1,0 +1,138 @@
+// Provides: bundle_coherent, bundle_trace: a run of rays that go about the same way from about the same place.
+// Needs: blocks.cl.  Reads: RUN, a multiple of BLOCK.
+//
+// One descent serves all: what a node tests are bounds over the rays. A block is tested ray by ray, for those that meet its box as
+// blocks_trace would find: by the same numbers, in the same order. Boxes lie within those of their parents and rounding is monotonic, so a ray
+// that meets a block's box met all above it: each ray tests the blocks that it would have tested alone, and no bit of its hit depends on company.
+#define BUNDLE_DIRECTIONS R(0.25)  // spread of directions, summed over the axes, up to which a bundle pays
+#define BUNDLE_ORIGINS R(0.125)    // the same of origins, of the scene's extent
+
+HOT int bundle_coherent(const Rays *rays, int count, real extent) {
+    real spread = (real)0, apart = (real)0;
+    for (int a = 0; a < 3; a++) {
+        real low = rays->direction[a], high = low, near = rays->origin[a], far = near;
+        for (int i = 1; i < count; i++) {
+            low = min_n(rays[i].direction[a], low);
+            high = max_n(rays[i].direction[a], high);
+            near = min_n(rays[i].origin[a], near);
+            far = max_n(rays[i].origin[a], far);
+        }
+        spread += high - low;
+        apart += far - near;
+    }
+    int alike = spread <= BUNDLE_DIRECTIONS && apart <= BUNDLE_ORIGINS * extent;
+    for (int i = 0; i < count; i++) alike &= rays[i].active && rays[i].octant == rays->octant;
+    return alike;
+}
+
+// Bounds over the rays, by axis: of the inverse directions; of the origins, the ones that planes of entry and of exit are seen from.
+// `slack` is twice the `pad` of blocks.cl, for the roundings of both computations.
+typedef struct {
+    real low_inverse[3], high_inverse[3], enter_origin[3], leave_origin[3], slack[3], t_min;
+    int enter[3], order_shift;
+} Bundle;
+
+HOT uint bundle_children(global const WideNode *node, const Bundle *bundle, real t_max, block_n *distance, block_int *child) {
+    block_n enter = (block_n)bundle->t_min, leave = (block_n)t_max;
+    for (int a = 0; a < 3; a++) {
+        const block_n first = load_block(node->planes[bundle->enter[a]]) - bundle->enter_origin[a];
+        const block_n last = load_block(node->planes[bundle->enter[a] ^ 1]) - bundle->leave_origin[a];
+        const block_n low = min_block(first * bundle->low_inverse[a], first * bundle->high_inverse[a]);
+        const block_n high = max_block(last * bundle->low_inverse[a], last * bundle->high_inverse[a]);
+        enter = max_block(low - bundle->slack[a], enter);
+        leave = min_block(high + bundle->slack[a], leave);
+    }
+    return children_in_order(node, bundle->order_shift, enter, leave, distance, child);
+}
+
+// The numbers of each ray that its boxes are tested by, side by side; `t` is its nearest hit so far, or -INFINITY once it needs no more.
+typedef struct {
+    real inverse[3][RUN], enter_shift[3][RUN], leave_shift[3][RUN], t_min[RUN], t[RUN], reach[RUN];
+} BundleRays;
+
+HOT void bundle_begin(global const Object *object, const Rays *rays, const Hits *hits, int count, int any_hit, Bundle *bundle, BundleRays *all) {
+    real reach = (real)0;
+    bundle->t_min = (real)INFINITY;
+    for (int i = 0; i < RUN; i++) {
+        WideRay ray;
+        const int from = i < count ? i : 0;
+        all->reach[i] = wide_ray(object, rays + from, &ray);
+        for (int a = 0; a < 3; a++) {
+            all->inverse[a][i] = ray.inverse[a];
+            all->enter_shift[a][i] = ray.enter_shift[a];
+            all->leave_shift[a][i] = ray.leave_shift[a];
+        }
+        all->t_min[i] = rays[from].t_min;
+        all->t[i] = i < count && !(any_hit && hits[from].slot >= 0) ? hits[from].t : (real)-INFINITY;
+        reach = max_n(all->reach[i], reach);
+        bundle->t_min = min_n(all->t_min[i], bundle->t_min);
+        bundle->order_shift = ray.order_shift;
+        for (int a = 0; a < 3; a++) bundle->enter[a] = ray.enter[a];
+    }
+    for (int a = 0; a < 3; a++) {
+        real low = rays->inverse[a], high = low, near = rays->origin[a], far = near;
+        for (int i = 1; i < count; i++) {
+            low = min_n(rays[i].inverse[a], low);
+            high = max_n(rays[i].inverse[a], high);
+            near = min_n(rays[i].origin[a], near);
+            far = max_n(rays[i].origin[a], far);
+        }
+        const int negative = bundle->enter[a] & 1;
+        bundle->low_inverse[a] = low;
+        bundle->high_inverse[a] = high;
+        bundle->enter_origin[a] = negative ? near : far;
+        bundle->leave_origin[a] = negative ? far : near;
+        bundle->slack[a] = (R(16.0) * UNIT_ROUNDOFF) * reach * max_n(abs_n(low), abs_n(high));
+    }
+}
+
+// Which of the BLOCK rays from `first` on meet the block's box: node_children's test, for one child and many rays.
+HOT uint bundle_live(global const Block *block, const Bundle *bundle, const BundleRays *all, int first) {
+#pragma OPENCL FP_CONTRACT ON
+#define rays_row(p) PASTE(vload, BLOCK)(0, (p) + first)
+    block_n enter = max_block(block->box[bundle->enter[0]] * rays_row(all->inverse[0]) + rays_row(all->enter_shift[0]), rays_row(all->t_min));
+    block_n leave = min_block(block->box[bundle->enter[0] ^ 1] * rays_row(all->inverse[0]) + rays_row(all->leave_shift[0]), rays_row(all->t));
+    enter = max_block(block->box[bundle->enter[1]] * rays_row(all->inverse[1]) + rays_row(all->enter_shift[1]), enter);
+    leave = min_block(block->box[bundle->enter[1] ^ 1] * rays_row(all->inverse[1]) + rays_row(all->leave_shift[1]), leave);
+    enter = max_block(block->box[bundle->enter[2]] * rays_row(all->inverse[2]) + rays_row(all->enter_shift[2]), enter);
+    leave = min_block(block->box[bundle->enter[2] ^ 1] * rays_row(all->inverse[2]) + rays_row(all->leave_shift[2]), leave);
+#undef rays_row
+    return block_bits(~(enter > leave));
+}
+
+HOT real bundle_block(const Geometry *geometry, global const Block *block, const Rays *rays, int any_hit, const Bundle *bundle, BundleRays *all, Hits *hits) {
+    real t_max = (real)-INFINITY;
+    for (int first = 0; first < RUN; first += BLOCK) {
+        for (uint bits = bundle_live(block, bundle, all, first); bits; bits &= bits - 1) {
+            const int i = first + lowest_bit(bits);
+            block_hits(geometry, block, rays + i, all->reach[i], hits + i);
+            all->t[i] = any_hit && hits[i].slot >= 0 ? (real)-INFINITY : hits[i].t;
+        }
+        for (int i = first; i < first + BLOCK; i++) t_max = max_n(all->t[i], t_max);
+    }
+    return t_max;
+}
+
+// Rays of one object, as blocks_trace has them one by one.
+HOT void bundle_object(const Geometry *geometry, global const Object *object, const Rays *rays, int count, int any_hit, Hits *hits) {
+    Bundle bundle;
+    BundleRays all;
+    bundle_begin(object, rays, hits, count, any_hit, &bundle, &all);
+    real t_max = (real)-INFINITY;
+    for (int i = 0; i < RUN; i++) t_max = max_n(all.t[i], t_max);
+    block_n distances[STACK_SIZE];
+    block_int children[STACK_SIZE];
+    uint pending[STACK_SIZE];
+    int level = 0, node = object->root;
+    for (;;) {
+        if (node >= 0) {
+            pending[level] = bundle_children(geometry->wide + node, &bundle, t_max, distances + level, children + level);
+            level += pending[level] != 0;
+        } else t_max = bundle_block(geometry, geometry->blocks + (-1 - node), rays, any_hit, &bundle, &all, hits);
+        if (!next_child(distances, children, pending, t_max, &level, &node)) return;
+    }
+}
+
+HOT void bundle_trace(const Geometry *geometry, const Rays *rays, int count, int any_hit, Hits *hits) {
+    for (int b = 0; b < geometry->object_count; b++) bundle_object(geometry, geometry->objects + b, rays, count, any_hit, hits);
+}
