@@ -63,4 +63,4 @@ def _breadth_first(of_tree: Ints, depth: NDArray[np.int32]) -> Ints:
     """The order by tree and depth, in which nodes of one depth stay from left to right."""
     key = of_tree * 64 + depth
     # NumPy sorts keys of 16 bits by radix.
-    return np.argsort(key.astype(np.uint16) if key[-1] < 1 << 16 and key.max() < 1 << 16 else key, kind="stable")
+    return np.argsort(key.astype(np.uint16) if key.max() < 1 << 16 else key, kind="stable")
