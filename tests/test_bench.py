@@ -246,6 +246,8 @@ def test_ranges_are_not_called_intervals() -> None:
     results = bench_results.results()
     results["plan"]["ladder_rounds"] = 5
     assert ["Of 5 rounds no interval" in text for text in report.warnings(results)] == [True]
+    without = [mark.note for mark in marks_of(results) if mark.passed is None]
+    assert without == ["no verdict: of 5 rounds no interval can be had"] * (12 + 1 + 1 + 3 + 4)
 
 
 def checkout(root: Path) -> tuple[Path, Path]:

@@ -11,6 +11,7 @@ from clrt.bench.table import interval, size
 from clrt.bench.versus import EMBREEX, KINDS
 from clrt.bench.worker import EMBREE
 from clrt.precision import DEFAULT
+from clrt.timing import FEWEST
 
 #: (side of the picture, peer) -> how many times as many rays a second
 _OVER = {(1024, EMBREE): 1.5, (1024, EMBREEX): 4.5, (1024, "Mitsuba"): 1.2, (512, EMBREE): 1.2}
@@ -46,19 +47,20 @@ class Mark:
 
 
 def marks_of(results: dict[str, Any]) -> list[Mark]:
-    """All marks of what a run has measured. Quick runs and generated scenes in the place of the report's give values, not verdicts."""
+    """All marks of what a run has measured. Quick runs, few rounds and generated scenes in the place of the report's give no verdicts."""
     reason = "a quick run" if results["quick"] else ""
     generated = {scene["role"]: scene["name"] for scene in results["scenes"] if scene["generated"]}
-    rabbit = reason or generated.get("rabbit", "")
+    rabbit, rounds = reason or generated.get("rabbit", ""), fewest_rounds(results)
+    turns = rabbit or (f"of {rounds} rounds no interval can be had" if rounds < FEWEST else "")
     marks: list[Mark] = []
     if "versus" in results:
-        marks += [*_versus(results["versus"], rabbit), _general(results["versus"]["general"], rabbit)]
+        marks += [*_versus(results["versus"], turns), _general(results["versus"]["general"], turns)]
     if "incoherent" in results:
-        marks.append(_incoherent(results["incoherent"], rabbit))
+        marks.append(_incoherent(results["incoherent"], turns))
     if "ladder" in results:
-        marks += _ladder(results["ladder"], rabbit)
+        marks += _ladder(results["ladder"], turns)
     if "commands" in results:
-        marks += _commands(results["commands"], rabbit)
+        marks += _commands(results["commands"], turns)
     if "imports" in results:
         marks += [_under(name, results["imports"][name]["best"], limit, reason) for name, limit in _IMPORTS_S.items()]
     if "trees" in results:
@@ -72,6 +74,12 @@ def marks_of(results: dict[str, Any]) -> list[Mark]:
         absent = sum(row["absent_bytes"] for row in results["programs"])
         marks.append(_mark("source of absent effects in a scene's program", "0 bytes", f"{absent} bytes", absent == 0, ""))
     return marks
+
+
+def fewest_rounds(results: dict[str, Any]) -> int:
+    """Of the parts in which contenders take turns; FEWEST where none of them was measured."""
+    plan = {"versus": "peer_rounds", "incoherent": "peer_rounds", "ladder": "ladder_rounds", "commands": "command_rounds"}
+    return min((int(results["plan"][rounds]) for part, rounds in plan.items() if part in results), default=FEWEST)
 
 
 def _mark(what: str, target: str, measured: str, passed: bool, reason: str) -> Mark:

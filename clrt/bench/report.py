@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
+from clrt.bench.marks import fewest_rounds
 from clrt.bench.table import Table
 from clrt.bench.tables_growth import growth_tables
 from clrt.bench.tables_peers import (
@@ -64,16 +65,10 @@ def warnings(results: dict[str, Any]) -> Iterator[str]:
         if min((value for name, value in used.items() if name != "trimesh"), default=cores) < _BUSY * cores:
             load = results["load_before"][0]
             yield f"Something else used the cores meanwhile (load {load} before): ratios hold better than times; run again when idle."
-    if (rounds := fewest_rounds(results)) is not None and rounds < FEWEST:
+    if (rounds := fewest_rounds(results)) < FEWEST:
         yield f"Of {rounds} rounds no interval can be had: brackets hold the range of the ratios. Give --rounds {FEWEST} or more."
     if made := [scene["name"] for scene in results["scenes"] if scene["generated"]]:
         yield f"Measured on {' and '.join(made)}; --scenes FOLDER says where the report's rabbit.txt and monkey.txt are."
-
-
-def fewest_rounds(results: dict[str, Any]) -> int | None:
-    """Of the parts that have ratios; None where none was measured."""
-    plan = {"versus": "peer_rounds", "incoherent": "peer_rounds", "ladder": "ladder_rounds", "commands": "command_rounds"}
-    return min((results["plan"][rounds] for part, rounds in plan.items() if part in results), default=None)
 
 
 def print_results(results: dict[str, Any]) -> None:
