@@ -61,12 +61,12 @@ def test_decimals_of_another_form_are_left(token: str) -> None:
 def test_lines_of_another_form_leave_the_others_alone() -> None:
     """A number at fault leaves its own line, and those of other forms, to the exact reader."""
     lines = ["L 1 2 3", "L 0.12345678901234567 1e-5 3", "L 1,2,x", "L 4 5 6.5", "", "L 1 2 3e"]
-    rows, left = read_bulk("\n".join(lines), lines)
-    assert left.tolist() == [1, 2, 5]
+    rows, left = read_bulk("\n".join(lines))
+    assert left == [(1, lines[1]), (2, lines[2]), (5, lines[5])]
     assert rows["L", 3].lines.tolist() == [1, 4]
     lines[5] = "# L 1 2 3e"
-    rows, left = read_bulk("\n".join(lines), lines)
-    assert left.tolist() == [2, 5]
+    rows, left = read_bulk("\n".join(lines))
+    assert left == [(2, lines[2]), (5, lines[5])]
     assert rows["L", 3].lines.tolist() == [1, 2, 4]
     assert rows["L", 3].values.tolist() == [[1, 2, 3], [0.12345678901234567, 1e-5, 3], [4, 5, 6.5]]
 
@@ -77,12 +77,12 @@ def test_long_texts_are_read_like_short_ones(monkeypatch: pytest.MonkeyPatch) ->
     forms = ["T " + " ".join(["{:.6f}"] * 9), "L {:.3f} {:.3f} {:.3f}", "", "# {:.2f}", "S {:.1f},{:.1f},{:.1f},{:.1e}", "  O"]
     lines = [str(rng.choice(forms)).format(*rng.normal(size=9)) for _ in range(300)]
     text = "\n".join(lines)
-    whole, left = read_bulk(text, lines)
+    whole, left = read_bulk(text)
     assert len(whole["S", 4]) > 20
     for size in (1, 7, 100, 1000):
         monkeypatch.setattr("clrt.scene.bulk._BLOCK", size)
-        rows, remain = read_bulk(text, lines)
-        assert remain.tolist() == left.tolist()
+        rows, remain = read_bulk(text)
+        assert remain == left
         assert rows.keys() == whole.keys()
         for form, part in rows.items():
             assert part.lines.tolist() == whole[form].lines.tolist()

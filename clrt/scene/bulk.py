@@ -101,7 +101,7 @@ def convert(lines: Sequence[str], fields: int) -> FloatArray | None:
         return None
 
 
-def _values(table: LineTable, chosen: NDArray[np.int64], fields: int, lines: Sequence[str]) -> tuple[NDArray[np.int64], FloatArray]:
+def _values(table: LineTable, chosen: NDArray[np.int64], fields: int, block: str) -> tuple[NDArray[np.int64], FloatArray]:
     """The lines of `chosen` that could be read, and their numbers, (n, fields) float64.
 
     Lines of short numbers are read at once, all others by NumPy's reader, or not at all where one of them is at fault.
@@ -113,39 +113,42 @@ def _values(table: LineTable, chosen: NDArray[np.int64], fields: int, lines: Seq
     values, whole = read.reshape(-1, fields), right.reshape(-1, fields).all(axis=1)
     others = np.flatnonzero(~whole)
     if len(others):
-        found = convert([lines[i].replace(",", " ") for i in chosen[others].tolist()], fields)
+        lines = block.replace(",", " ").split("\n")
+        found = convert([lines[i] for i in chosen[others].tolist()], fields)
         if found is None:
             return chosen[whole], values[whole]
         values[others] = found
     return chosen, values
 
 
-def read_bulk(text: str, lines: Sequence[str]) -> tuple[dict[tuple[str, int], Rows], NDArray[np.int64]]:
-    """Convert all plain lines: (letter, fields) -> rows, and the indices of the lines that are left, empty ones aside."""
+def read_bulk(text: str) -> tuple[dict[tuple[str, int], Rows], list[tuple[int, str]]]:
+    """Convert all plain lines: (letter, fields) -> rows, and the lines that are left, each with its index, empty ones aside."""
     found: dict[tuple[str, int], list[Rows]] = {}
-    left = []
+    left: list[tuple[int, str]] = []
     start = before = 0
     while start <= len(text):
         end = text.find("\n", start + _BLOCK)
         block = text[start : end if end >= 0 else None]
         table = scan_lines(block)
         remains = table.fields >= 0
-        for form, chosen, values in _block_rows(table, lines[before : before + len(remains)]):
+        for form, chosen, values in _block_rows(table, block):
             found.setdefault(form, []).append(Rows(chosen + before + 1, values))
             remains[chosen] = False
-        left.append(np.flatnonzero(remains) + before)
+        if remains.any():
+            lines = block.split("\n")
+            left += [(before + i, lines[i]) for i in np.flatnonzero(remains).tolist()]
         start, before = start + len(block) + 1, before + len(remains)
     rows = {
         form: Rows(np.concatenate([r.lines for r in parts]), np.concatenate([r.values for r in parts])) for form, parts in found.items()
     }
-    return rows, np.concatenate(left)
+    return rows, left
 
 
-def _block_rows(table: LineTable, lines: Sequence[str]) -> Iterator[tuple[tuple[str, int], NDArray[np.int64], FloatArray]]:
+def _block_rows(table: LineTable, block: str) -> Iterator[tuple[tuple[str, int], NDArray[np.int64], FloatArray]]:
     """Each form that occurs, the indices of its lines, and their numbers."""
     for letter, forms in LETTERS.items():
         of_letter = np.flatnonzero((table.letter == ord(letter)) & table.numeric)
         for fields in forms if len(of_letter) else ():
-            chosen, values = _values(table, of_letter[table.fields[of_letter] == fields], fields, lines)
+            chosen, values = _values(table, of_letter[table.fields[of_letter] == fields], fields, block)
             if len(chosen):
                 yield (letter, fields), chosen, values

@@ -44,17 +44,30 @@ def _read(words: Words, characters: NDArray[np.uint8], starts: Ints, ends: Ints)
     length = ends - starts
     sign = characters[starts]
     negative = sign == ord("-")
-    signed = negative | (sign == ord("+"))
-    digits = np.clip(length - signed, 0, WINDOW)
-    late = _kept(words[ends - 8], np.minimum(digits, 8))  # the last eight characters
-    early = _kept(words[ends - 16], np.maximum(digits - 8, 0))
-    early, late, decimals = _without_dot(early, late)
-    right = (length <= WINDOW) & _all_digits(early) & _all_digits(late)
+    digits = length - (negative | (sign == ord("+")))
+    whole, decimals, right = _short(words[ends - 8], np.minimum(digits, 8))
+    longer = np.flatnonzero(digits > 8)
+    if len(longer):
+        whole[longer], decimals[longer], right[longer] = _long(words, ends[longer], np.minimum(digits[longer], WINDOW))
     count = digits - (decimals >= 0)
-    right &= (count >= 1) & (count <= _MOST_DIGITS)
-    whole = _number(early) * _U(10**8) + _number(late)
+    right &= (length <= WINDOW) & (count >= 1) & (count <= _MOST_DIGITS)
     values = whole.astype(np.float64) / _POWERS[np.maximum(decimals, 0)]
     return np.where(negative, -values, values), right
+
+
+def _short(late: Words, digits: Ints) -> tuple[Words, Ints, Bools]:
+    """Of numbers of at most 8 characters, the last of `late`: the digits as one number, how many follow the dot (-1: none), whether all are
+    digits."""
+    late = _kept(late, digits)
+    dotted, at = _dot(late)
+    late = np.where(dotted, (_above(at) & late) | ((_below(at) & late) << _U(8)) | _U(0x30), late)
+    return _number(late), np.where(dotted, _bytes_above(at), -1), _all_digits(late)
+
+
+def _long(words: Words, ends: Ints, digits: Ints) -> tuple[Words, Ints, Bools]:
+    """The same of numbers of 9 to 16 characters."""
+    early, late, decimals = _without_dot(_kept(words[ends - 16], digits - 8), words[ends - 8])
+    return _number(early) * _U(10**8) + _number(late), decimals, _all_digits(early) & _all_digits(late)
 
 
 def _kept(word: Words, count: Ints) -> Words:

@@ -10,6 +10,7 @@ import difflib
 import stat
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -28,17 +29,22 @@ from clrt.scene.words import WORDS, WordCall, read_word
 class Declarations:
     """The lines of one scene text.
 
-    text_lines : the lines as written, for the columns of faults found later
+    text : all of it, with line feeds for line ends
     rows : (letter, count of fields) -> the lines of that form; forms that do not occur are absent
     broken : letter or word -> numbers of the lines that start with it, or nearly so, and could not be read
     words : the lines that start with a word, in their order
     """
 
     source: str
-    text_lines: list[str]
+    text: str
     rows: dict[tuple[str, int], Rows] = field(default_factory=dict)
     broken: dict[str, list[int]] = field(default_factory=dict)
     words: list[WordCall] = field(default_factory=list)
+
+    @cached_property
+    def text_lines(self) -> list[str]:
+        """The lines as written, for the columns of faults found later."""
+        return self.text.split("\n")
 
     def get(self, letter: str, fields: int) -> Rows:
         """The lines of one form; none where it does not occur."""
@@ -111,18 +117,13 @@ def read_declarations(text: str, source: str, faults: Faults, *, bulk: bool = Tr
     `bulk=False` takes every line through the exact reader: the same values, slowly.
     """
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
-    found = Declarations(source, text.split("\n"))
-    left: Iterable[int] = range(len(found.text_lines))
+    found = Declarations(source, text)
+    left: Iterable[tuple[int, str]] = enumerate(found.text_lines) if not bulk else ()
     if bulk:
-        found.rows, left = _bulk_part(text, found.text_lines)
+        found.rows, left = read_bulk(text)
     _ExactReader(found, faults).read(left)
     _check_ranges(found, faults)
     return found
-
-
-def _bulk_part(text: str, lines: list[str]) -> tuple[dict[tuple[str, int], Rows], list[int]]:
-    rows, left = read_bulk(text, lines)
-    return rows, left.tolist()
 
 
 class _ExactReader:
@@ -133,10 +134,10 @@ class _ExactReader:
         self._faults = faults
         self._rows: dict[tuple[str, int], tuple[list[int], list[list[float]]]] = {}
 
-    def read(self, indices: Iterable[int]) -> None:
-        """Read the lines of these indices, and merge them with what `rows` holds."""
-        for index in indices:
-            tokens = tokenise(self._found.text_lines[index])
+    def read(self, given: Iterable[tuple[int, str]]) -> None:
+        """Read lines, each with its index, and merge them with what `rows` holds."""
+        for index, line in given:
+            tokens = tokenise(line)
             if tokens:
                 self._read_line(tokens, index + 1)
         for (letter, fields), (lines, values) in self._rows.items():
