@@ -16,7 +16,7 @@ def ratio(median: float) -> dict[str, Any]:
 def results() -> dict[str, Any]:
     """A full run on the report's scenes, in which every mark is kept."""
     return {
-        "started": "2031-02-03T04:05:06+00:00", "quick": False, "load_before": [0.1, 0.2, 0.3], "load_after": [0.1, 0.2, 0.3],
+        "format": 2, "started": "2031-02-03T04:05:06+00:00", "quick": False, "load_before": [0.1, 0.2, 0.3], "load_after": [0.1, 0.2, 0.3],
         "plan": {"peer_rounds": 11, "ladder_rounds": 15, "command_rounds": 7},
         "machine": {
             "cpu": "Some CPU (TM)", "cores": 2, "memory_gib": 8.0, "opencl_platform": "PoCL", "opencl_driver": "3.0", "lanes": 16,

@@ -309,6 +309,9 @@ def test_results_are_kept_by_date_and_processor_and_read_again(tmp_path: Path) -
     path.write_text("{}")
     with pytest.raises(ClrtError, match="started is missing"):
         export.read(path)
+    path.write_text(json.dumps(bench_results.results() | {"format": 1}))
+    with pytest.raises(ClrtError, match="another version of the benchmarks"):
+        export.read(path)
     path.write_text("no json")
     with pytest.raises(ClrtError, match="give a file that"):
         export.read(path)
@@ -371,7 +374,7 @@ def test_quick_run_measures_everything(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     (path,) = tmp_path.iterdir()
     results = json.loads(path.read_text())
-    general = {"started", "finished", "quick", "machine", "load_before", "load_after", "plan", "scenes", "marks"}
+    general = {"format", "started", "finished", "quick", "machine", "load_before", "load_after", "plan", "scenes", "marks"}
     assert set(results) == general | set(export.PARTS)
     assert {"cpu", "cores", "memory_gib", "os", "python", "opencl_platform", "opencl_driver", "packages"} <= set(results["machine"])
     sphere, rabbit = ("sphere (generated)", False), ("rabbit-like (generated)", True)

@@ -19,6 +19,7 @@ BEGIN, END = "<!-- bench:begin -->", "<!-- bench:end -->"
 _PLACE = re.compile(rf"{re.escape(BEGIN)}\n.*?{re.escape(END)}", re.S)
 #: what may be measured, in this order
 PARTS = ("versus", "incoherent", "ladder", "trees", "tests", "commands", "imports", "programs", "growth")
+FORMAT = 2  #: of the JSON; one more where a key gets another meaning
 _KEYS = ("started", "quick", "machine", "scenes", "marks")
 
 
@@ -42,6 +43,8 @@ def read(path: Path) -> dict[str, Any]:
     missing = [key for key in _KEYS if not isinstance(results, dict) or key not in results]
     if missing:
         raise ClrtError(f"{path}: no results of the benchmarks, {missing[0]} is missing; give a file that `python -m clrt.bench` wrote")
+    if results.get("format") != FORMAT:
+        raise ClrtError(f"{path}: results of another version of the benchmarks; measure again, or read them with that version")
     return dict(results)
 
 
