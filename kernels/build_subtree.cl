@@ -148,10 +148,10 @@ static bool build_one(global const double *vertices, const Stack *stack, Open no
     return true;
 }
 
-// Works through jobs [first, end). memory: of each work-item, 7 rows of `size` for the stack, then twice `size` for its nodes and
+// Works through `count` jobs. memory: of each work-item, 7 rows of `size` for the stack, then twice `size` for its nodes and
 // `size` for its entries. taken: counters, zero before; where an output is too small, they tell how large it should be.
-kernel void build_subtrees(global const double *vertices, global const int *jobs, global const float *cells, const int first,
-                           const int end, global const int *pool_ref, global const float *pool_bounds, const int pool_rows,
+kernel void build_subtrees(global const double *vertices, global const int *jobs, global const float *cells, const int count,
+                           global const int *pool_ref, global const float *pool_bounds, const int pool_rows,
                            global int *memory, const int size, global int *taken, global int *nodes, const int most_nodes,
                            global int *entries, const int most_entries, global int *done) {
     Stack stack;
@@ -160,7 +160,7 @@ kernel void build_subtrees(global const double *vertices, global const int *jobs
     for (int r = 0; r < 6; r++) stack.row[r] = (global float *)(own + (size_t)size * (1 + r));
     stack.size = size;
     global int *own_nodes = own + (size_t)size * 7, *own_entries = own + (size_t)size * 9;
-    for (int j = first + atomic_inc(taken + TAKEN_JOBS); j < end; j = first + atomic_inc(taken + TAKEN_JOBS)) {
+    for (int j = atomic_inc(taken + TAKEN_JOBS); j < count; j = atomic_inc(taken + TAKEN_JOBS)) {
         global const int *job = jobs + (size_t)j * JOB_WORDS;
         global int *report = done + (size_t)j * DONE_WORDS;
         Open root;

@@ -87,14 +87,14 @@ class SubtreeBuilder:
         return Subtrees(done[:, 0], done[:, 1], done[:, 2], done[:, 3], np.concatenate(all_nodes), np.concatenate(all_entries))
 
     def _launch(self, table: Words, cells: F32, pool: Store, size: int, room: Ints) -> tuple[Ints, Ints, Words, Words]:
-        """One launch: each job's report, how many nodes and entries there would have been room wanted for, and both."""
+        """One launch: each job's report, how many nodes and entries room was wanted for, and both."""
         machine = self.machine
         workers = min(machine.workers, len(table))
         memory = self._buffer("memory", workers * size * _WORDS * 4)
         nodes, entries = self._buffer("nodes", int(room[0]) * 8), self._buffer("entries", int(room[1]) * 4)
         taken, done = machine.upload(np.zeros(3, np.int32)), machine.empty(len(table) * _DONE_WORDS * 4)
         machine.run(
-            "build_subtrees", workers, self.vertices, machine.upload(table), machine.upload(cells), 0, len(table), *pool.arguments,
+            "build_subtrees", workers, self.vertices, machine.upload(table), machine.upload(cells), len(table), *pool.arguments,
             memory, size, taken, nodes, int(room[0]), entries, int(room[1]), done,
         )  # fmt: skip
         wanted = machine.read(taken, 3, np.int32)[1:].astype(np.int64)
