@@ -77,8 +77,8 @@ def run(plan: measure.Plan, folder: Path | None, device_name: str | None, quick:
     """The measurements as JSON types; what is under way is told on standard error. Raises ClrtError, OSError."""
     device = open_device(device_name)
     results: dict[str, Any] = {
-        "format": export.FORMAT, "started": machine.now(), "quick": quick, "machine": machine.describe(device.info), "load_before": machine.load_average(),
-        "plan": asdict(plan),
+        "format": export.FORMAT, "started": machine.now(), "quick": quick, "machine": machine.describe(device.info),
+        "load_before": machine.load_average(), "plan": asdict(plan),
     }  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="clrt-bench-") as name:
         scratch = Path(name)
