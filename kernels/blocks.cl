@@ -140,22 +140,27 @@ HOT void block_test(global const Block *block, const Rays *rays, real reach, con
     found->error = error;
 }
 
+// One by one. Rare, so kept out of the loops' registers, and out of their text.
+static __attribute__((noinline)) void block_unsure(const Geometry *geometry, global const Block *block, const Rays *rays, real reach, uint bits,
+                                                   Hits *hits) {
+    for (; bits; bits &= bits - 1) triangle_test(geometry, rays, reach, block->slot[lowest_bit(bits)], 0, ALL_LANES, hits);
+}
+
 HOT void block_hits(const Geometry *geometry, global const Block *block, const Rays *rays, real reach, Hits *hits) {
     BlockHits found;
     block_test(block, rays, reach, hits, &found);
     if (!found.possible) return;
-    if (found.sure == found.possible && !(found.sure & (found.sure - 1)) && rays->after < 0) {
-        const int lane = lowest_bit(found.sure);
-        real t[BLOCK], error[BLOCK];
-        PASTE(vstore, BLOCK)(found.t, 0, t);
-        PASTE(vstore, BLOCK)(found.error, 0, error);
-        hits->slot = block->slot[lane];
-        fetch_ahead(geometry->vertices + 9 * (size_t)hits->slot, 72, 0);
-        //@ block_accept
+    if (found.sure != found.possible || (found.sure & (found.sure - 1)) || rays->after >= 0) {
+        block_unsure(geometry, block, rays, reach, found.possible, hits);
         return;
     }
-    for (uint bits = found.possible; bits; bits &= bits - 1)
-        triangle_test(geometry, rays, reach, block->slot[lowest_bit(bits)], 0, ALL_LANES, hits);
+    const int lane = lowest_bit(found.sure);
+    real t[BLOCK], error[BLOCK];
+    PASTE(vstore, BLOCK)(found.t, 0, t);
+    PASTE(vstore, BLOCK)(found.error, 0, error);
+    hits->slot = block->slot[lane];
+    fetch_ahead(geometry->vertices + 9 * (size_t)hits->slot, 72, 0);
+    //@ block_accept
 }
 
 // The nearest child left to see, of the deepest node that has any, if it is entered before t_max; false where there is none.
@@ -236,5 +241,5 @@ kernel void prepare_boxes(global const WideNode *wide, global Block *blocks, int
     const real after = rays->t_min, before = hits->t;
 //@end
 //@hook block_accept_default
-        hits->t = t[lane];
+    hits->t = t[lane];
 //@end

@@ -25,17 +25,16 @@ HOT void ray_begin(const GivenRay *ray, int good, const Geometry *geometry, real
     rays_prepare(rays, extent);
 }
 
-// How many hits a ray has: one is sought after the other, in the order of t and id, until there is no further one. Listed where that is asked for.
-HOT int hits_in_order(const Geometry *geometry, Rays *ray, int number, int listed, global const int *begin, global int2 *list) {
+// The first hit of a ray that is traced alone, or any; to count or list, how many there are: one is sought after the other, in the order of t
+// and id, until there is no further one.
+HOT int ray_trace(const Geometry *geometry, Rays *ray, int number, int mode, global const int *begin, global int2 *list, Hits *first) {
     int found = 0;
     while (found <= geometry->slot_count) {
-        Hits hits;
-        hits.t = ray->t_max;
-        hits.slot = -1;
-        //@ hits_begin
-        scene_trace(geometry, ray, 0, 0, &hits);
-        if (hits.slot < 0) break;
-        if (listed) list[begin[number] + found] = (int2)(hits.slot, number);
+        Hits hits = *first;
+        scene_trace(geometry, ray, 0, mode == ANY_HIT, &hits);
+        if (mode < COUNT_HITS) *first = hits;
+        if (mode < COUNT_HITS || hits.slot < 0) break;
+        if (mode == LIST_HITS) list[begin[number] + found] = (int2)(hits.slot, number);
         found++;
         ray->after = hits.slot;
         ray->after_t = hits.t;
@@ -95,10 +94,8 @@ void cast(global const WideNode *wide, global const Block *blocks, global const 
     const int bundle = mode < COUNT_HITS && bundle_coherent(rays, end - first, extent);
     if (bundle) bundle_trace(&geometry, rays, end - first, mode == ANY_HIT, found);
     for (int i = first; !bundle && i < end; i++) {
-        Rays *ray = rays + i - first;
-        if (!ray->active) continue;
-        if (mode < COUNT_HITS) scene_trace(&geometry, ray, 0, mode == ANY_HIT, found + i - first);
-        else tally[i - first] = hits_in_order(&geometry, ray, order ? order[i] : i, mode == LIST_HITS, result, list);
+        if (!rays[i - first].active) continue;
+        tally[i - first] = ray_trace(&geometry, rays + i - first, order ? order[i] : i, mode, result, list, found + i - first);
     }
     for (int i = first; i < end; i++) {
         const int number = order ? order[i] : i;

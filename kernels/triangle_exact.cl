@@ -125,6 +125,6 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
     const real after = rays->t_min_high, before = hits->low;
 //@end
 //@hook block_accept
-        hits->t = t[lane] + error[lane];
-        hits->low = t[lane] - error[lane];
+    hits->t = t[lane] + error[lane];
+    hits->low = t[lane] - error[lane];
 //@end
