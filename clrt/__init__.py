@@ -73,6 +73,7 @@ def render(
     error: float | None = None,
     within: float | None = None,
     standard_error: bool = False,
+    cache: bool = False,
 ) -> Image:
     """The picture of a scene, or of a scene text; its `stats` are the figures of the run.
 
@@ -87,6 +88,7 @@ def render(
     progress : called with a phase and how much of it is done, 0 to 1
     error : sample where it brings most until the picture's relative error is below this, with 95% (docs/error.md); not with `samples`
     within : the best picture in this many seconds, from the call on; with `error`, too: until the first of both is reached
+    cache : keep trees for later runs in the user's cache folder, and take those that are there, as the command does (docs/caching.md)
     standard_error : the picture has a `standard_error` with plain `samples`, too, which are split over 8 independent sequences for it
 
     Raises SceneError, DeviceError, LimitError; OSError where a file cannot be read.
@@ -102,7 +104,7 @@ def render(
     image = render_scene(
         loaded, size=size, tree=tree, device=device, precision=precision, depth=depth, samples=samples, seed=seed,
         count=count, without=without, progress=progress, error=error, within=within, standard_error=standard_error,
-        deadline=None if within is None else start + within,
+        deadline=None if within is None else start + within, cache=cache,
     )
     if image.stats is not None and loaded is not scene:
         image.stats.read_s = read_s
