@@ -80,7 +80,7 @@ def test_a_point_tells_times_trees_and_memory() -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    assert (found["count"], found["triangles"], found["rays"]) == (10, 82, 64 * 64)
+    assert (found["count"], found["triangles"], found["rays"]) == (10, 22, 64 * 64)
     assert len(found["trace_s"]["all"]) == 3
     peaks = found["peak_bytes"]
     assert 10**7 < peaks["before"] <= peaks["scene"] <= peaks["built"] <= peaks["traced"]
