@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from rich.live import Live
 
 _PATIENCE_S = 1.0  #: what is done sooner shows nothing
+_READY_S, _READY_AT_ONCE_S = 0.5, 0.1  #: what is done sooner does not even import what draws: of all, and of a phase that is shown at once
 
 _WORDS = {
     "read": "reading the scene", "trees": "building the trees", "compile": "compiling the kernels", "render": "rendering",
@@ -31,6 +33,8 @@ class PhaseProgress:
 
     def __init__(self, *, quiet: bool = False) -> None:
         self._live: Live | None = None
+        self._lock = threading.Lock()
+        self._timers: list[threading.Timer] = []
         self._quiet = quiet
         self._phase = ""
         self._fraction = 0.0
@@ -39,6 +43,8 @@ class PhaseProgress:
     def __call__(self, phase: str, fraction: float) -> None:
         if phase != self._phase:
             self._phase, self._phase_start = phase, time.monotonic()
+            if phase in _AT_ONCE and self._timers:
+                self._show_in(_READY_AT_ONCE_S)
         self._fraction = min(max(fraction, 0.0), 1.0)
 
     def say(self, text: str) -> None:
@@ -50,16 +56,32 @@ class PhaseProgress:
 
     def __enter__(self) -> PhaseProgress:
         if not self._quiet and streams.is_terminal(sys.stderr):
-            from rich.console import Console
-            from rich.live import Live
-
-            self._live = Live(console=Console(stderr=True), get_renderable=self._draw, transient=True, refresh_per_second=8)
-            self._live.start()
+            self._show_in(_READY_S)
         return self
 
+    def _show_in(self, seconds: float) -> None:
+        timer = threading.Timer(seconds, self._show)
+        timer.daemon = True
+        self._timers.append(timer)
+        timer.start()
+
+    def _show(self) -> None:
+        """Start to draw, unless all is done by now."""
+        from rich.console import Console
+        from rich.live import Live
+
+        with self._lock:
+            if self._timers and self._live is None:
+                self._live = Live(console=Console(stderr=True), get_renderable=self._draw, transient=True, refresh_per_second=8)
+                self._live.start()
+
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        if self._live is not None:
-            self._live.stop()
+        with self._lock:
+            for timer in self._timers:
+                timer.cancel()
+            self._timers = []
+            if self._live is not None:
+                self._live.stop()
 
     def _draw(self) -> RenderableType:
         """One line: a status while no fraction is known, else a bar, per cent and what remains. No line in the first second."""
