@@ -51,7 +51,9 @@ def results() -> dict[str, Any]:
             "points": [point("triangles", n, build) for n, build in ((1000, 0.01), (100_000, 0.2), (1_000_000, 1.5), (10_000_000, 20.0))]
             + [point("pixels", 1, 0.2), point("separate", 10, 0.05), point("instances", 10, 0.01)],
             "fits": {"triangles": {"a": 2.0, "b": 1.5, "residual": 0.0123},
-                     "beyond": {"largest": 10_000_000, "fitted_up_to": 100_000, "foretold": 20.0, "measured": 22.0}},
+                     "beyond": {"fitted_up_to": 100_000, "points": [
+                         {"triangles": 1_000_000, "foretold": 20.0, "measured": 22.0},
+                         {"triangles": 10_000_000, "foretold": 25.0, "measured": 50.0}]}},
         },
         "marks": [{"what": "a mark", "target": "under 2", "measured": "1", "passed": True, "note": ""}],
     }  # fmt: skip

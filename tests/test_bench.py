@@ -145,8 +145,8 @@ def test_marks_that_are_kept_pass() -> None:
         (lambda r: r["trees"][1].update(build_s=bench_results.series(0.12)), "sah tree of rabbit"),
         (lambda r: r["growth"]["points"][2].update(build_s=bench_results.series(2.5)), "sah tree of 1 million triangles"),
         (lambda r: r["growth"]["points"][3]["peak_bytes"].update(built=13 * 10**9), "sah tree of 10 million triangles"),
-        (lambda r: r["growth"]["fits"]["beyond"].update(measured=30.0),
-         "time a ray at 10,000,000 triangles, over the logarithm fitted up to 100,000"),
+        (lambda r: r["growth"]["fits"]["beyond"]["points"][0].update(measured=30.0),
+         "time a ray at 1,000,000 triangles, over the logarithm fitted up to 100,000"),
         (lambda r: r["tests"][0].update(tests_per_ray=40.0), "ray-triangle tests a ray, sah, rabbit, 1024 squared"),
         (lambda r: r["tests"][2].update(tests_per_ray=30.0), "ray-triangle tests a ray, sah, monkey, 1024 squared"),
         (lambda r: r["tests"][1].update(depth=21), "median tree, rabbit"),
@@ -232,7 +232,7 @@ def test_growth_is_told_a_ray_and_a_triangle() -> None:
     assert triangles.rows[1] == ["100,000", "200.0 ms", "100.0 ms", "2", "2.00", "19.1 ns", "3.0 MiB", "1.00 GiB"]
     assert [row[0] for row in objects.rows] == ["10 objects of 20 triangles", "10 instances of 20 triangles"]
     assert fits.rows == [["triangles", "2.00 ns", "+1.500 ns", "1.2%"]]
-    assert "22.0 ns, 1.10 times" in fits.note
+    assert "20.0 ns for 1,000,000 (22.0 ns measured, 1.10 times as much), 25.0 ns for 10,000,000" in fits.note
 
 
 def test_a_busy_machine_is_told() -> None:

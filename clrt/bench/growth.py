@@ -72,7 +72,7 @@ def curve(rows: Sequence[dict[str, Any]], kind: str) -> tuple[list[int], list[fl
 
 
 def fits_of(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The fit of every curve with three points or more; of triangles also how far the largest lies off the curve of those up to BEND."""
+    """The fit of every curve with three points or more; of triangles also how far larger numbers lie off the curve of those up to BEND."""
     fits: dict[str, Any] = {}
     for kind in AXES:
         numbers, times = curve(rows, kind)
@@ -82,8 +82,10 @@ def fits_of(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     few = [i for i, number in enumerate(numbers) if number <= 1.1 * BEND]
     if 3 <= len(few) < len(numbers):
         small = logarithm([numbers[i] for i in few], [times[i] for i in few])
-        said = small["a"] + small["b"] * np.log2(numbers[-1])
-        fits["beyond"] = {"largest": numbers[-1], "fitted_up_to": numbers[few[-1]], "foretold": float(said), "measured": times[-1]}
+        fits["beyond"] = {"fitted_up_to": numbers[few[-1]], "points": [
+            {"triangles": n, "foretold": float(small["a"] + small["b"] * np.log2(n)), "measured": t}
+            for n, t in zip(numbers[len(few) :], times[len(few) :], strict=True)
+        ]}  # fmt: skip
     return fits
 
 

@@ -70,9 +70,10 @@ def _fits(growth: dict[str, Any]) -> Table:
             rows.append([WORDS[kind], f"{fit['a']:.2f} ns", f"{fit['b']:+.3f} ns", f"{fit['residual']:.1%}"])
     note = "Time a ray as a + b log2(n), by least squares. Residual: root of the mean squared distance from the curve, over the mean time."
     if "beyond" in fits:
-        beyond = fits["beyond"]
-        note += (
-            f" The curve of up to {beyond['fitted_up_to']:,} triangles foretells {beyond['foretold']:.1f} ns a ray for "
-            f"{beyond['largest']:,}; measured are {beyond['measured']:.1f} ns, {beyond['measured'] / beyond['foretold']:.2f} times as much."
-        )
+        told = ", ".join(
+            f"{point['foretold']:.1f} ns for {point['triangles']:,} ({point['measured']:.1f} ns measured, "
+            f"{point['measured'] / point['foretold']:.2f} times as much)"
+            for point in fits["beyond"]["points"]
+        )  # fmt: skip
+        note += f" The curve of up to {fits['beyond']['fitted_up_to']:,} triangles foretells {told}."
     return Table("Fitted curves", ["n", "a", "b, a doubling", "residual"], rows, note=note)
