@@ -19,8 +19,7 @@ from clrt.adaptive.schedule import Walk
 IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
 
-PILOT = 0.05  #: of the whole that is spent when the forecast is made, where noise was seen to fall ...
-_BLIND_PILOT = 0.2  #: ... and where too few tiles had two levels more than the first to tell how fast it does
+PILOT = 0.15  #: of the whole that is spent when the forecast is made
 MOST_SAMPLES = 1 << 20  #: of a pixel
 _CHUNK_S = 0.1  #: launches are to take about this long, so that Ctrl-C and progress come between them
 _FIRST_TILES = 32  #: in the first launch, whose speed is not known yet
@@ -104,7 +103,8 @@ class Engine:
         picture = self.replicates.means(0, 1)
         differs = np.zeros(picture.shape[:2], bool)
         for axis in (0, 1):
-            apart = ~(np.abs(np.diff(picture, axis=axis)) <= contrast * abs(float(picture.mean()))).all(-1)
+            close: NDArray[np.bool_] = np.abs(np.diff(picture, axis=axis)) <= contrast * abs(float(picture.mean()))
+            apart = ~close.all(axis=-1)
             before, behind = ((slice(None, -1), slice(None)), (slice(1, None), slice(None))) if axis == 0 else (
                 (slice(None), slice(None, -1)), (slice(None), slice(1, None)))  # fmt: skip
             differs[before] |= apart
@@ -184,7 +184,7 @@ class Engine:
         """The forecast, as soon as PILOT of the whole is done."""
         seconds = None if self.goal.deadline is None else self.spent + max(self._left(), 0.0)
         found = Outlook(self.ledger, self.walk, self.cost, self.overhead, self.spent).forecast(self.goal.error, seconds)
-        if self.spent >= (PILOT if len(self.ledger.noise) > 2 else _BLIND_PILOT) * found.seconds.value:
+        if self.spent >= PILOT * found.seconds.value:
             self.forecast = as_told(found, self.goal.error)
             self.foretell(self.forecast)
 

@@ -77,18 +77,18 @@ class Ledger:
 
     def numbers(self) -> FloatArray:
         """(2,): finite numbers of the picture on each side, at least 1."""
-        return np.maximum(3.0 * (self.pixels - self.bad).sum(1), 1.0)
+        return np.asarray(np.maximum(3.0 * (self.pixels - self.bad).sum(1), 1.0))
 
     def side_error(self, side: int, levels: IntArray) -> Interval:
         """Relative error of the picture's other side, were it sampled as this one, judged by this one alone; levels : (tiles,)."""
         own = np.broadcast_to(levels, (2, self.grid.count))
-        sums = [self.at(sums, own)[side].sum() for sums in (self.noise, self.total, self.square)]
-        return self._relative(*sums, self.numbers()[side])
+        noise, total, square = (float(self.at(sums, own)[side].sum()) for sums in (self.noise, self.total, self.square))
+        return self._relative(noise, total, square, float(self.numbers()[side]))
 
     def error(self, levels: IntArray) -> Interval:
         """Relative error of the picture of these levels, (2, tiles): root mean square over pixels and channels over the picture's mean."""
-        sums = [self.at(sums, levels).sum() for sums in (self.noise, self.total, self.square)]
-        return self._relative(*sums, self.numbers().sum())
+        noise, total, square = (float(self.at(sums, levels).sum()) for sums in (self.noise, self.total, self.square))
+        return self._relative(noise, total, square, float(self.numbers().sum()))
 
     def _relative(self, noise: float, total: float, square: float, numbers: float) -> Interval:
         """For a pixel, (x - mu)^2 less the estimate u of its variance v has the variance 2 R / (R - 1) v^2: docs/error.md."""

@@ -13,11 +13,12 @@ from clrt.adaptive.schedule import Walk, threshold
 
 FloatArray = NDArray[np.float64]
 
-_SLOPES = (0.7, 3.0)  #: a variance falls about as n^-1 (less is a matter of chance) and at most as n^-3 (Owen 1997: smooth integrands)
-_USUAL = 2.2  #: where nothing is known yet
-#: Slopes begin steep, while more and more of a pixel's parts get a sample each, and fall towards those of random samples, as far as the
-#: light depends on pairs of dimensions that are stratified apart: slope - LAST by the factor FADE a level, in the mean of seven scenes.
-_LAST, _FADE = 1.1, 0.65
+#: A tile's variance is taken to be a sum of two powers of n: of what varies smoothly over its samples (Owen 1997: at most n^-3), and of
+#: edges and of pairs of dimensions that are stratified apart (random samples: n^-1). Chosen for the scenes of docs/error.md.
+_STEEP, _FLAT = 2.4, 1.0
+_USUAL = 1.5  #: the power of n where nothing is known yet
+_ALL = 0.4  #: weight of what all tiles showed beside what is usual
+_OWN = 0.4  #: weight of a tile's own power beside that of all
 _PACE = 0.1  #: relative: how well the time of a sample is known
 _SLOPE = 0.12  #: of a slope's change from the pilot to the end, measured over the scenes of docs/error.md
 _MOST_STEPS = 400
@@ -55,31 +56,32 @@ class Outlook:
                         Interval(reached, min(better, reached) * spread[1], max(worse, reached) * spread[0]))  # fmt: skip
 
     def _slopes(self) -> tuple[FloatArray, float]:
-        """(2, tiles): the power of n with which the variance falls, halfway between the tile's own and that of all; its doubt."""
+        """(tiles,): the power of n with which the variance fell last, between the tile's own and that of all; its doubt."""
         ledger, reached = self.ledger, self.ledger.reached
-        own = np.full(ledger.grid.count, np.nan)
-        pooled = _USUAL
-        apart = []
+        mixed = np.full(ledger.grid.count, _USUAL)
+        apart: list[float] = []
         for level in range(1, len(ledger.noise)):
             tiles = np.flatnonzero(reached >= level)
             before, after = ledger.noise[level - 1][:, tiles], ledger.noise[level][:, tiles]
             sums = before.sum(1), after.sum(1)
             if tiles.size == 0 or min(sums[0].min(), sums[1].min()) <= 0.0:
                 continue
+            pooled = _ALL * float(np.log2(sums[0].sum() / sums[1].sum())) + (1.0 - _ALL) * _USUAL
             apart = np.log2(sums[0] / sums[1]).tolist()
-            pooled = float(np.log2(sums[0].sum() / sums[1].sum()))
             with np.errstate(divide="ignore", invalid="ignore"):
-                slope = np.log2(before.sum(0) / after.sum(0))
-            own[tiles] = np.where(np.isfinite(slope), slope, np.nan)
-        mixed = np.where(np.isnan(own), pooled, 0.5 * (own + pooled))
+                own = np.log2(before.sum(0) / after.sum(0))
+            mixed[tiles] = np.where(np.isfinite(own), _OWN * own + (1.0 - _OWN) * pooled, pooled)
+            if level == 1:
+                mixed[reached < 1] = pooled
         doubt = _SLOPE + (abs(apart[0] - apart[1]) / 2.0 if apart else 0.3)
-        return np.broadcast_to(np.clip(mixed, *_SLOPES), (2, len(mixed))), doubt
+        return mixed, doubt
 
     def _run(self, slopes: FloatArray, pace: float, error: float | None, seconds: float | None) -> tuple[float, float]:
         """The walk with variances that fall as assumed: seconds and relative error at its end."""
         ledger, walk = self.ledger, self.walk
-        slopes = np.clip(slopes, *_SLOPES)
+        steep = _steep_share(slopes)
         noise, levels = ledger.at(ledger.noise, walk.levels).copy(), walk.levels.copy()
+        start = noise.copy()
         numbers = float(ledger.numbers().sum())
         scale = numbers * max(abs(float(ledger.at(ledger.total, walk.levels).sum())) / numbers, np.finfo(float).tiny) ** 2
         now = ledger.side_error(0, walk.levels[0])
@@ -93,8 +95,7 @@ class Outlook:
                 break
             while (up := (noise / (size * ledger.samples(levels)) > threshold(step)) & (2 * ledger.samples(levels) <= most)).any():
                 levels += up
-                ahead = levels - walk.levels
-                noise = np.where(up, noise * 2.0 ** -(_LAST + (slopes - _LAST) * _FADE**ahead), noise)
+                noise = start * _fallen(steep, levels - walk.levels)
             higher = np.maximum(there, levels.max(0))
             rising = [int(ledger.samples(level)) for level in range(int(higher.max())) if ((there <= level) & (higher > level)).any()]
             time += pace * (float(np.sum(self.cost * (ledger.samples(higher) - ledger.samples(there)))) + self.overhead * len(rising))
@@ -105,6 +106,16 @@ class Outlook:
                 return max(seconds, self.spent), best[1] + (reached - best[1]) * min(max(share, 0.0), 1.0)
             best = (time, reached)
         return best
+
+
+def _steep_share(slopes: FloatArray) -> FloatArray:
+    """The steep part of variances that fell with these powers in their last doubling."""
+    return np.asarray(np.clip((2.0**slopes - 2.0**_FLAT) / (2.0**_STEEP - 2.0**_FLAT), 0.0, 1.0))
+
+
+def _fallen(steep: FloatArray, doublings: NDArray[np.int64]) -> FloatArray:
+    """What is left of variances with these steep parts after so many doublings."""
+    return np.asarray(steep * 2.0 ** (-_STEEP * doublings) + (1.0 - steep) * 2.0 ** (-_FLAT * doublings))
 
 
 def as_told(forecast: Forecast, error: float | None) -> Forecast:

@@ -22,7 +22,7 @@ from clrt.adaptive.ledger import Ledger
 
 IntArray = NDArray[np.int64]
 
-STEPS = 4  #: a factor 2 of the threshold in so many steps
+STEPS = 2  #: a factor 2 of the threshold in so many steps
 MOST_LEVELS = 30
 
 
