@@ -3,14 +3,6 @@
 //
 // `object_from_world` holds three rows of four numbers in float64: points of the world relative to the local origin become points of the object relative
 // to its own. Normals come back by its transpose; the one scale that smooth triangles allow is 1 / |row|.
-#if LANES == 1
-typedef double double_n;
-#define to_double_n(x) ((double)(x))
-#else
-typedef PASTE(double, LANES) double_n;
-#define to_double_n(x) PASTE(convert_double, LANES)(x)
-#endif
-
 HOT void instance_rays(global const Placement *from, const Rays *rays, Rays *inner, real_n *length) {
     double_n origin[3], direction[3];
     for (int a = 0; a < 3; a++) {

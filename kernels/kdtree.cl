@@ -57,6 +57,9 @@ HOT void kdtree_trace(const Geometry *geometry, global const Object *object, con
             const int first = words[at], end = first + (shape >> 2);
             const mask_n live = is_at_most(t_near, t_far);
             //@ count_tests
+            // On large meshes what the tests wait for is memory: all records of the leaf are asked for at once.
+            if (shared_origin)
+                for (int i = first; i < end; i++) fetch_ahead(geometry->planes + geometry->indices[i]);
             for (int i = first; i < end; i++) triangle_test(geometry, rays, reach, geometry->indices[i], shared_origin, live, hits);
             if (any_hit) {
                 lanes &= is_less(hits->slot, NO_LANES);

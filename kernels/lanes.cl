@@ -1,4 +1,4 @@
-// Provides: real, real_n, mask_n (LANES rays side by side), R(), choose, min_n, max_n, abs_n, any_lane, comparisons, dot_n, lane access.
+// Provides: real, real_n, mask_n, double_n (LANES rays side by side), R(), choose, min_n, max_n, abs_n, any_lane, fetch_ahead, comparisons, dot_n, lane access.
 // Needs: nothing.  Reads: LANES (16, 8, 4 or 1), REAL_BITS (32 or 64).
 //
 // Out-of-line vector built-ins (select, any, fmin...) go through memory on PoCL; everything here compiles to plain vector instructions.
@@ -19,6 +19,7 @@ typedef long lane_int;
 #define TINY_COMPONENT 0x1p-500
 #define HUGE_INVERSE 0x1p500
 #define REAL_MAX DBL_MAX
+#define WITHOUT_SIGN ((mask_n)0x7fffffffffffffffL)
 #else
 typedef float real;
 typedef int lane_int;
@@ -29,6 +30,7 @@ typedef int lane_int;
 #define TINY_COMPONENT 0x1p-90f
 #define HUGE_INVERSE 0x1p90f
 #define REAL_MAX FLT_MAX
+#define WITHOUT_SIGN ((mask_n)0x7fffffff)
 #endif
 
 #if LANES == 1
@@ -39,6 +41,10 @@ typedef lane_int mask_n;
 #define is_at_most(a, b) ((mask_n) - ((a) <= (b)))
 #define is_equal(a, b) ((mask_n) - ((a) == (b)))
 #define to_real_n(x) ((real_n)(x))
+typedef double double_n;
+#define to_double_n(x) ((double)(x))
+#define as_mask_n(x) PASTE(as_, LANE_INT_NAME)(x)
+#define as_real_n(x) PASTE(as_, REAL_NAME)(x)
 #else
 typedef PASTE(REAL_NAME, LANES) real_n;
 typedef PASTE(LANE_INT_NAME, LANES) mask_n;
@@ -46,6 +52,10 @@ typedef PASTE(LANE_INT_NAME, LANES) mask_n;
 #define is_at_most(a, b) ((a) <= (b))
 #define is_equal(a, b) ((a) == (b))
 #define to_real_n(x) PASTE(PASTE(convert_, REAL_NAME), LANES)(x)
+typedef PASTE(double, LANES) double_n;
+#define to_double_n(x) PASTE(convert_double, LANES)(x)
+#define as_mask_n(x) PASTE(PASTE(as_, LANE_INT_NAME), LANES)(x)
+#define as_real_n(x) PASTE(PASTE(as_, REAL_NAME), LANES)(x)
 #endif
 #define is_greater(a, b) is_less(b, a)
 #define is_at_least(a, b) is_at_most(b, a)
@@ -56,13 +66,26 @@ typedef PASTE(LANE_INT_NAME, LANES) mask_n;
 
 HOT real_n min_n(real_n a, real_n b) { return choose(is_less(a, b), a, b); }
 HOT real_n max_n(real_n a, real_n b) { return choose(is_greater(a, b), a, b); }
-HOT real_n abs_n(real_n a) { return choose(is_less(a, (real_n)0), -a, a); }
+HOT real_n abs_n(real_n a) { return as_real_n(as_mask_n(a) & WITHOUT_SIGN); }
+
+// Asks for what is read soon; nothing where the compiler has no word for it.
+#if defined(__clang__) && (defined(__x86_64__) || defined(__aarch64__))
+#define fetch_ahead(p) __builtin_prefetch((const void *)(uintptr_t)(p))
+#else
+#define fetch_ahead(p)
+#endif
 
 // One mask test where the instruction set has it, a halving reduction elsewhere.
 #if LANES == 16 && REAL_BITS == 32 && defined(__AVX512DQ__) && defined(__clang__)
 #define any_lane(m) (__builtin_ia32_cvtd2mask512(m) != 0)
 #elif LANES == 8 && REAL_BITS == 64 && defined(__AVX512DQ__) && defined(__clang__)
 #define any_lane(m) (__builtin_ia32_cvtq2mask512(m) != 0)
+#elif LANES == 8 && REAL_BITS == 32 && defined(__AVX__) && defined(__clang__)
+#define any_lane(m) (__builtin_ia32_movmskps256(as_float8(m)) != 0)
+#elif LANES == 4 && REAL_BITS == 64 && defined(__AVX__) && defined(__clang__)
+#define any_lane(m) (__builtin_ia32_movmskpd256(as_double4(m)) != 0)
+#elif LANES == 4 && REAL_BITS == 32 && defined(__SSE__) && defined(__clang__)
+#define any_lane(m) (__builtin_ia32_movmskps(as_float4(m)) != 0)
 #elif LANES == 16
 HOT int any_lane(mask_n m) {
     const PASTE(LANE_INT_NAME, 8) a = m.lo | m.hi;

@@ -147,8 +147,8 @@ HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit
 //@hook planar
     planar &= is_less(load_lanes(hit->place), NO_LANES);  // the plane of a placement is not where its vertices are
 //@end
-//@hook refine_lane
-        if (hit->place[k] >= 0) continue;  // nor is its point; the one there is and its error hold
+//@hook refine_lanes
+    refined &= is_less(load_lanes(hit->place), NO_LANES);  // the point there is and its error hold
 //@end
 //@hook media_own
         if (hit->place[k] >= 0) own[k] = hit->medium[k];

@@ -1,59 +1,90 @@
 // Provides: refine_points: where rays of the rung `exact` start from, better than `real` can compute it.
 // Needs: exact.cl, hit.cl.  Reads: nothing.
 
+#if LANES == 1
+#define absolute_lanes(x) fabs(x)
+#define first_if_less(a, b, x, y) ((a) < (b) ? (x) : (y))
+#else
+#define absolute_lanes(x) PASTE(as_double, LANES)(PASTE(as_long, LANES)(x) & 0x7fffffffffffffffL)
+#define first_if_less(a, b, x, y) choose((a) < (b), x, y)
+#endif
+#define gather_double(result, expression)                           \
+    {                                                               \
+        double lane_[LANES];                                        \
+        for (int k = 0; k < LANES; k++) lane_[k] = (expression);    \
+        result = load_lanes(lane_);                                 \
+    }
+
+HOT double_n dot_lanes(const double_n *a, const double_n *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+HOT void cross_lanes(const double_n *a, const double_n *b, double_n *c) {
+    c[0] = a[1] * b[2] - a[2] * b[1];
+    c[1] = a[2] * b[0] - a[0] * b[2];
+    c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+// As triple_double of exact.cl, all lanes at once.
+HOT void triple_lanes(const double_n *d, const double_n *p, const double_n *q, double_n *value, double_n *error) {
+    double_n sum = 0, size = 0;
+    for (int a = 0; a < 3; a++) {
+        const int b = (a + 1) % 3, c = (a + 2) % 3;
+        const double_n one = p[b] * q[c], other = p[c] * q[b];
+        sum += d[a] * (one - other);
+        size += absolute_lanes(d[a]) * (absolute_lanes(one) + absolute_lanes(other));
+    }
+    *value = sum;
+    *error = DOUBLE_BOUND * size + UNDERFLOW;
+}
+
 // The points where rays meet triangles again, in float64 from the numbers as given: rounded once, they lie off the surface by u |P|
 // a coordinate, as much again for the offset, and the float64 error; which is what `error` becomes. Spheres keep theirs.
 // A point nearer to an edge than 8u |P| is moved to that distance inside its triangle: rounded, it could else lie behind the face
 // beyond the edge, and a ray inside of a closed mesh would leave it there.
 static __attribute__((noinline)) void refine_points(const Geometry *geometry, const Rays *rays, const int shared_origin, const Hit *hit,
                                                     mask_n active, real_n *point, real_n *error) {
-    lane_int lane[LANES];
-    real p[3][LANES], n[3][LANES], e[LANES], from[3][LANES], along[3][LANES];
-    store_lanes(active, lane);
-    store_lanes(*error, e);
+    mask_n refined = active & is_less(load_lanes(hit->slot), (mask_n)geometry->slot_count);
+    //@ refine_lanes
+    if (!any_lane(refined)) return;
+    lane_int slot[LANES];
+    store_lanes(choose(refined, load_lanes(hit->slot), NO_LANES), slot);
+    double_n origin[3], direction[3], v[3], e1[3], e2[3], corner[3];
     for (int a = 0; a < 3; a++) {
-        store_lanes(point[a], p[a]);
-        store_lanes(hit->geometric[a], n[a]);
-        store_lanes(rays->origin[a], from[a]);
-        store_lanes(rays->direction[a], along[a]);
+        double_n v1, v2;
+        gather_double(v[a], geometry->vertices[9 * (size_t)slot[k] + a]);
+        gather_double(v1, geometry->vertices[9 * (size_t)slot[k] + 3 + a]);
+        gather_double(v2, geometry->vertices[9 * (size_t)slot[k] + 6 + a]);
+        e1[a] = v1 - v[a];
+        e2[a] = v2 - v[a];
+        origin[a] = shared_origin ? (double_n)geometry->shared_origin[a] : geometry->local_origin[a] + to_double_n(rays->origin[a]);
+        direction[a] = to_double_n(rays->direction[a]);
+        corner[a] = v[a] - origin[a];
     }
-    for (int k = 0; k < LANES; k++) {
-        if (!lane[k] || hit->slot[k] >= geometry->slot_count) continue;
-        //@ refine_lane
-        double origin[3], direction[3], e1[3], e2[3], normal[3], at[3], cross[3], sum = 0, size = 0;
-        for (int a = 0; a < 3; a++) {
-            origin[a] = shared_origin ? geometry->shared_origin[a] : geometry->local_origin[a] + (double)from[a][k];
-            direction[a] = (double)along[a][k];
-        }
-        global const double *v = geometry->vertices + 9 * (size_t)hit->slot[k];
-        Plane plane;
-        plane_distance_double(geometry, origin, direction, (int)hit->slot[k], &plane);
-        const double t = plane.offset / plane.rate;
-        for (int a = 0; a < 3; a++) {
-            e1[a] = v[3 + a] - v[a];
-            e2[a] = v[6 + a] - v[a];
-            at[a] = origin[a] - v[a] + t * direction[a];
-            size += fabs(v[a] - geometry->local_origin[a] + at[a]);
-        }
-        cross_double(e1, e2, normal);
-        const double area = dot_double(normal, normal);
-        cross_double(at, e2, cross);
-        const double u = dot_double(cross, normal) / area;
-        cross_double(e1, at, cross);
-        const double w = dot_double(cross, normal) / area;
-        const double longest = sqrt(fmax(dot_double(e1, e1), dot_double(e2, e2))) * 2;
-        const double least = fmin(fmin(u, w), 1 - u - w), wanted = fmin(0.1, 8 * UNIT_ROUNDOFF * size * longest / sqrt(area));
-        const double inwards = least < wanted ? (wanted - least) / (1.0 / 3 - least) : 0;
-        for (int a = 0; a < 3; a++) {
-            const double exact = v[a] - geometry->local_origin[a] + at[a] + inwards * ((e1[a] + e2[a]) / 3 - at[a]);
-            p[a][k] = (real)exact;
-            sum += fabs(exact * n[a][k]);
-        }
-        const double rest = (plane.offset_error + fabs(t) * plane.rate_error) / sqrt(area);
-        e[k] = (real)(2 * UNIT_ROUNDOFF * sum + 2 * rest);
+    double_n rate, rate_error, offset, offset_error;
+    triple_lanes(direction, e1, e2, &rate, &rate_error);
+    triple_lanes(corner, e1, e2, &offset, &offset_error);
+    const double_n t = offset / rate;
+    double_n normal[3], at[3], cross[3], sum = 0, size = 0;
+    for (int a = 0; a < 3; a++) {
+        at[a] = origin[a] - v[a] + t * direction[a];
+        size += absolute_lanes(v[a] - geometry->local_origin[a] + at[a]);
     }
-    for (int a = 0; a < 3; a++) point[a] = load_lanes(p[a]);
-    *error = load_lanes(e);
+    cross_lanes(e1, e2, normal);
+    const double_n area = dot_lanes(normal, normal), length = sqrt(area);
+    cross_lanes(at, e2, cross);
+    const double_n u = dot_lanes(cross, normal) / area;
+    cross_lanes(e1, at, cross);
+    const double_n w = dot_lanes(cross, normal) / area, rest = 1.0 - u - w;
+    const double_n edge_1 = dot_lanes(e1, e1), edge_2 = dot_lanes(e2, e2);
+    const double_n longest = sqrt(first_if_less(edge_1, edge_2, edge_2, edge_1)) * 2.0;
+    const double_n less = first_if_less(u, w, u, w), least = first_if_less(less, rest, less, rest);
+    const double_n needed = 8 * (double)UNIT_ROUNDOFF * size * longest / length, wanted = first_if_less(needed, (double_n)0.1, needed, (double_n)0.1);
+    const double_n inwards = first_if_less(least, wanted, (wanted - least) / (1.0 / 3 - least), (double_n)0);
+    for (int a = 0; a < 3; a++) {
+        const double_n exact = v[a] - geometry->local_origin[a] + at[a] + inwards * ((e1[a] + e2[a]) / 3.0 - at[a]);
+        sum += absolute_lanes(exact * to_double_n(hit->geometric[a]));
+        point[a] = choose(refined, to_real_n(exact), point[a]);
+    }
+    const double_n off = (offset_error + absolute_lanes(t) * rate_error) / length;
+    *error = choose(refined, to_real_n(2 * (double)UNIT_ROUNDOFF * sum + 2.0 * off), *error);
 }
 
 //@hook hit_distance
