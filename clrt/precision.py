@@ -34,7 +34,8 @@ class Precision:
 
     def lanes(self, float_lanes: int) -> int:
         """Lanes of a packet on a device that holds `float_lanes` float32 numbers in a vector."""
-        return max(1, float_lanes * 32 // self.bits)
+        room = float_lanes * 32 // self.bits
+        return next((n for n in (16, 8, 4) if n <= room), 1)
 
 
 RUNGS = {

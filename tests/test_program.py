@@ -112,3 +112,9 @@ def test_unknown_precision_names_the_rungs() -> None:
 def test_lanes_of_a_rung_fill_the_same_vector() -> None:
     assert [rung("watertight").lanes(n) for n in (16, 8, 4, 1)] == [16, 8, 4, 1]
     assert np.dtype(rung("watertight").real).itemsize * 8 == rung("watertight").bits
+
+
+def test_every_rung_has_packets_for_every_device() -> None:
+    # Two doubles fill what four floats do, and there is no packet of two rays.
+    assert [rung("double").lanes(n) for n in (16, 8, 4, 1)] == [8, 4, 1, 1]
+    assert all(ladder.lanes(n) in program.PACKETS for ladder in RUNGS.values() for n in (16, 8, 4, 1))
