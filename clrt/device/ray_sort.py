@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clrt.device import kernel_cache
 from clrt.device.program import SORT_BITS
 from clrt.device.session import Buffers
 
@@ -48,6 +50,10 @@ class RaySorter:
 
     def order(self, given: Sequence[Any], count: int) -> Any:
         """A buffer with the numbers of the rays in the order to trace them in; `given`: the arguments GIVEN_PARAMETERS of given.cl."""
+        with kernel_cache.loading() if self._capacity == 0 else nullcontext():  # first launches are part of compiling
+            return self._sorted(given, count)
+
+    def _sorted(self, given: Sequence[Any], count: int) -> Any:
         self._reserve(count)
         queue, run = self._buffers.device.queue, -(-count // _RUNS)
         sizes = np.int32(count), np.int32(run)
