@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -89,13 +89,13 @@ def caches(folder: Path) -> dict[str, str]:
     return {"XDG_CACHE_HOME": str(folder), "POCL_CACHE_DIR": ""}
 
 
-def run(scene: Path, where: dict[str, str], picture: str, *options: str) -> dict[str, float]:
-    """Renders, and gives the figures of the run."""
-    arguments = [sys.executable, "-m", "clrt", str(scene), "-o", str(scene.parent / picture), "--stats", "-", *options]
+def run(scene: Path, where: dict[str, str], picture: str, *options: str) -> tuple[int, int, int]:
+    """Renders, and gives the triangles, and the nodes and the depth of their trees, as the run tells them."""
+    arguments = [sys.executable, "-m", "clrt", str(scene), "-o", str(scene.parent / picture), *options]
     done = subprocess.run(arguments, env=os.environ | where, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    figures: dict[str, float] = json.loads(done.stdout)
-    return figures
+    _, triangles, nodes, depth, *_ = re.findall(r"^all .*", done.stdout, re.M)[0].replace(",", "").split()
+    return int(triangles), int(nodes), int(depth)
 
 
 def kept(cache: Path) -> set[str]:
@@ -115,9 +115,8 @@ def test_picture_is_the_same_with_trees_of_an_earlier_run_broken_ones_and_none(t
     none = run(scene, where, "none.png", "--no-cache")
     pictures = {(tmp_path / f"{name}.png").read_bytes() for name in ("first", "again", "broken", "none")}
     assert len(pictures) == 1
-    assert {(f["nodes"], f["depth"], f["tests_per_ray"]) for f in (first, again, broken, none)} == {
-        (first["nodes"], first["depth"], first["tests_per_ray"])
-    }
+    assert first == again == broken == none
+    assert first[1] > 20
 
 
 def test_no_cache_leaves_nothing(tmp_path: Path, scene: Path) -> None:
@@ -164,10 +163,8 @@ def test_kernels_are_compiled_for_the_sizes_of_later_launches(tmp_path: Path, sc
     if device.info.platform != POCL:
         pytest.skip("the default device is not PoCL's")
     run(scene, caches(tmp_path / "cache"), "picture.png")
-    found = sorted(file.name for file in (tmp_path / "cache").rglob("*.so") if "render" in str(file) or "prepare" in str(file))
-    names = [name for name in found if not name.startswith("lib")]
-    assert names.count("prepare_planes.so") == names.count("prepare_triangles.so") == 1
-    assert names.count("render.so") == 2  # the picture's, and that of the pass that counts
+    names = sorted(file.name for file in (tmp_path / "cache" / "clrt" / "pocl").rglob("*.so"))
+    assert names == ["prepare_planes.so", "prepare_triangles.so", "render.so"]
 
 
 def test_error_of_the_compiler_comes_out_of_the_thread(device: Device) -> None:
