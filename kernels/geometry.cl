@@ -1,7 +1,9 @@
 // Provides: Geometry, what a ray can meet, by pointer.
 // Needs: structs.  Reads: nothing.
 typedef struct {
-    global const int2 *nodes;            // inner: (bits of the split, child << 2 | axis); leaf: (first index, count << 2 | 3)
+    // Inner nodes: (bits of the split, lower child << 4 | 8 where the upper one is an empty leaf | 4 where the lower one is | axis);
+    // leaves: (first index, count << 2 | 3).
+    global const int2 *nodes;
     global const int *indices;           // triangle slots, leaf by leaf
     global const Triangle *triangles;    // a slot each, relative to the local origin, for rays of any origin
     global const EdgePlanes *planes;     // a slot each, seen from the shared origin

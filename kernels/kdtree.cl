@@ -38,12 +38,21 @@ HOT void kdtree_trace(const Geometry *geometry, global const Object *object, con
                     t_low = t - width;
                     t_high = t + width;
                 }
-                const int near_side = (octant >> axis) & 1, child = shape >> 2;
+                const int near_side = (octant >> axis) & 1, child = shape >> 4;
                 const mask_n live = is_at_most(t_near, t_far);
                 const mask_n go_near = live & ~is_less(t_high, t_near), go_far = live & ~is_greater(t_low, t_far);
                 if (!any_lane(go_far)) node = child + near_side;
                 else if (!any_lane(go_near)) node = child + 1 - near_side;
-                else {
+                else if (shape & (8 >> near_side)) {
+                    // Nothing lies on the far side: no need to come back.
+                    node = child + near_side;
+                    t_far = choose(go_near, min_n(t_high, t_far), (real_n)-INFINITY);
+                } else if (shape & (4 << near_side)) {
+                    // Nothing lies on the near side.
+                    node = child + 1 - near_side;
+                    t_near = max_n(t_low, t_near);
+                    t_far = choose(go_far, t_far, (real_n)-INFINITY);
+                } else {
                     stack_node[top] = child + 1 - near_side;
                     stack_near[top] = max_n(t_low, t_near);
                     stack_far[top] = choose(go_far, t_far, (real_n)-INFINITY);

@@ -16,12 +16,16 @@ from clrt.device import layout
 from clrt.device.packed import FloatArray, Packed
 from clrt.device.program import frame_dtype, material_dtype
 from clrt.device.rounding import rounded_down, rounded_up
+from clrt.errors import LimitError
 from clrt.features import Features
 from clrt.kdtree.arrays import LEAF
 from clrt.kdtree.tree import KdTree
 from clrt.precision import Precision
 from clrt.scene.model import MeshObject, Scene
 from clrt.scene.placed import object_origins, placed_boxes, placements
+
+_LOWER_EMPTY, _UPPER_EMPTY = 4, 8  #: bits of an inner node's word: a child is a leaf without triangles, as a quarter of leaves are
+MOST_NODES = 1 << 27  #: of all trees together
 
 
 def local_origin(scene: Scene) -> FloatArray:
@@ -59,11 +63,16 @@ def leaf_order(tree: KdTree, triangles: int) -> tuple[NDArray[np.int64], NDArray
 
 
 def nodes_of(tree: KdTree, first_node: int, first_index: int) -> NDArray[np.int32]:
-    """(m, 2) int32 node words: inner (bits of the split, child << 2 | axis), leaf (first index, count << 2 | 3)."""
+    """(m, 2) int32 node words, as geometry.cl has them. Raises LimitError where a child's number has no room."""
+    if first_node + len(tree.split_axis) > MOST_NODES:
+        raise LimitError(f"the trees of the scene have more than {MOST_NODES:,} nodes; leave some of its triangles out")
     leaf = tree.split_axis == LEAF
+    inner, hollow = np.flatnonzero(~leaf), leaf & (tree.count == 0)
+    empty = np.zeros(len(leaf), np.int32)
+    empty[inner] = _LOWER_EMPTY * hollow[tree.child[inner]] + _UPPER_EMPTY * hollow[tree.child[inner] + 1]
     words = np.empty((len(leaf), 2), np.int32)
     words[:, 0] = np.where(leaf, tree.child + first_index, tree.split_pos.view(np.int32))
-    words[:, 1] = np.where(leaf, (tree.count << 2) | 3, ((tree.child + first_node) << 2) | tree.split_axis)
+    words[:, 1] = np.where(leaf, (tree.count << 2) | 3, ((tree.child + first_node) << 4) | empty | tree.split_axis)
     return words
 
 
