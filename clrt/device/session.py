@@ -41,7 +41,7 @@ def shares_lights(scene: Scene, precision: Precision, device: Device, slots: int
     """Whether edge planes of every light, of so many slots (default: of all triangles), fit in the device's memory."""
     count = scene.triangle_count if slots is None else slots
     size = max(1, count) * layout.edge_planes(precision.real).itemsize * len(scene.lights_with_position)
-    return size <= min(device.handle.max_mem_alloc_size, device.handle.global_mem_size // 4)
+    return bool(size <= min(device.handle.max_mem_alloc_size, device.handle.global_mem_size // 4))
 
 
 class Buffers:
