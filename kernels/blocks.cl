@@ -159,7 +159,6 @@ HOT void block_hits(const Geometry *geometry, global const Block *block, const R
     PASTE(vstore, BLOCK)(found.t, 0, t);
     PASTE(vstore, BLOCK)(found.error, 0, error);
     hits->slot = block->slot[lane];
-    fetch_ahead(geometry->vertices + 9 * (size_t)hits->slot, 72, 0);
     //@ block_accept
 }
 

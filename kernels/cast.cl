@@ -72,7 +72,7 @@ void cast(global const WideNode *wide, global const Block *blocks, global const 
     geometry.local_origin[1] = local_origin.y;
     geometry.local_origin[2] = local_origin.z;
     //@ begin
-    // Three loops, as memory that one ray waits for is then asked for while others are at work.
+    // Loop by loop, as memory that one ray waits for is then asked for while others are at work.
     GivenRay run[RUN];
     Rays rays[RUN];
     Hits found[RUN];
@@ -96,6 +96,11 @@ void cast(global const WideNode *wide, global const Block *blocks, global const 
     for (int i = first; !bundle && i < end; i++) {
         if (!rays[i - first].active) continue;
         tally[i - first] = ray_trace(&geometry, rays + i - first, order ? order[i] : i, mode, result, list, found + i - first);
+    }
+    for (int i = 0; mode == FIRST_HIT && i < end - first; i++) {
+        if (found[i].slot < 0) continue;
+        fetch_ahead(vertices + 9 * (size_t)found[i].slot, 9 * sizeof(double), 0);
+        fetch_ahead(sources + found[i].slot, sizeof(HitSource), 0);
     }
     for (int i = first; i < end; i++) {
         const int number = order ? order[i] : i;
