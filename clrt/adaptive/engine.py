@@ -70,6 +70,7 @@ class Engine:
         self.start = time.perf_counter()
         self.cost: FloatArray = np.zeros(self.grid.count)  #: seconds of one sample of a tile, all replicates
         self.ledger = Ledger(self.grid, replicates.count, PILOT_SAMPLES if goal.samples is None else goal.samples // replicates.count)
+        self.before = np.zeros((replicates.count, *self.grid.inside.shape, 3), np.float32)  #: means of the last look
         self.forecast: Forecast | None = None
         self.overhead = replicates.overhead()  #: seconds of a launch
 
@@ -103,13 +104,13 @@ class Engine:
         picture = self.replicates.means(0, 1)
         differs = np.zeros(picture.shape[:2], bool)
         for axis in (0, 1):
-            close: NDArray[np.bool_] = np.abs(np.diff(picture, axis=axis)) <= contrast * abs(float(picture.mean()))
-            apart = ~close.all(axis=-1)
+            close = np.asarray(np.abs(np.diff(picture, axis=axis)) <= contrast * abs(float(picture.mean())))
+            apart = ~close.all(-1)
             before, behind = ((slice(None, -1), slice(None)), (slice(1, None), slice(None))) if axis == 0 else (
                 (slice(None), slice(None, -1)), (slice(None), slice(1, None)))  # fmt: skip
             differs[before] |= apart
             differs[behind] |= apart
-        edge = self.grid.tilewise(differs).any((1, 2))[tiles]
+        edge = np.asarray(self.grid.tilewise(differs).any((1, 2)))[tiles]
         still, values = tiles[~edge], self.grid.tilewise(picture)
         for part in _parts(still, _READ_TILES):
             self.ledger.put(part, 0, flat(values[part], self.grid.inside[part], self.grid.sides))
@@ -141,7 +142,9 @@ class Engine:
     def _look(self, tiles: IntArray, level: int) -> None:
         """Puts what the sums of these tiles say into the ledger."""
         values = self.replicates.values(tiles, int(self.ledger.samples(level)))
-        self.ledger.put(tiles, level, moments(values, self.grid.inside[tiles], self.grid.sides))
+        before = self.before[:, tiles] if level > 0 else None
+        self.ledger.put(tiles, level, moments(values, self.grid.inside[tiles], self.grid.sides, before))
+        self.before[:, tiles] = values
 
     def _extend(self, tiles: IntArray) -> bool:
         """The next level of these tiles; False where there is no time for all."""
