@@ -25,16 +25,23 @@ def _rows(study: dict[str, Any], part: str) -> list[Row]:
     return list(found["rows"]) if isinstance(found, dict) else []
 
 
+def short(value: float) -> str:
+    """Three digits, without powers of ten where a person would write none."""
+    if not 1e3 <= abs(value) < 1e9:
+        return f"{value:.3g}"
+    return f"{float(f'{value:.3g}'):,.0f}"
+
+
 def _times(median: float, low: float, high: float) -> str:
-    return f"{median:.3g}x ({low:.3g} to {high:.3g})"
+    return f"{short(median)}x ({short(low)} to {short(high)})"
 
 
 def _interval(value: Row) -> str:
-    return f"{value['median']:.3g} ({value['low']:.3g} to {value['high']:.3g})"
+    return f"{short(value['median'])} ({short(value['low'])} to {short(value['high'])})"
 
 
 def _milliseconds(value: Row) -> str:
-    return f"{1e3 * value['median']:.3g} ms ({1e3 * value['low']:.3g} to {1e3 * value['high']:.3g})"
+    return f"{short(1e3 * value['median'])} ms ({short(1e3 * value['low'])} to {short(1e3 * value['high'])})"
 
 
 def _positive(*values: Row | None) -> bool:
@@ -82,8 +89,8 @@ def _samples(study: dict[str, Any]) -> Iterator[str]:
         yield f"The error falls with the samples to the power {_interval(slope)}; random sampling has -0.5."
         if slope["high"] < 0.0 and _positive(last["rmse"], last["seconds"]):
             digit = 10.0 ** (-1.0 / slope["median"])
-            yield (f"The next digit, a tenth of the error, so takes {digit:.3g}x the samples: from {last['rmse']['median']:.2g} at "
-                   f"{_milliseconds(last['seconds'])} about {digit * last['seconds']['median']:.3g} s, if the slope holds.")  # fmt: skip
+            yield (f"The next digit, a tenth of the error, so takes {short(digit)}x the samples: from {last['rmse']['median']:.2g} at "
+                   f"{_milliseconds(last['seconds'])} about {short(digit * last['seconds']['median'])} s, if the slope holds.")  # fmt: skip
     floor, made = study["samples"].get("floor"), study["samples"].get("reference")
     if floor is not None and made is not None:
         yield (f"The reference has {made['samples']:,} samples in {made['rung']}, {made['times_largest']}x those of the largest point, "
