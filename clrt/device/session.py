@@ -183,8 +183,8 @@ class Tracer:
     def run_tiles(self, frame: Any, sums: Any, samples: tuple[int, int], tiles: NDArray[np.int32]) -> None:
         """Adds samples [first, end) of tiles to `sums`, and waits for them; `frame` is taken in place of the tracer's own.
 
-        sums : buffer of float64, tile by tile, each (TILE height, width, 3); tiles : (n, 4) column and row of the first pixel, seed, and the
-            place of the sums, in tiles
+        sums : buffer of float64, tile by tile, each (TILE height, width, 3)
+        tiles : (n, 4) column and row of the first pixel, seed, and the place of the sums, counted in tiles
         """
         packet_width, packet_height = program.PACKETS[self.lanes]
         packets = len(tiles) * (program.TILE[0] // packet_width) * (program.TILE[1] // packet_height)
