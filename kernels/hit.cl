@@ -1,12 +1,13 @@
 // Provides: Hit: what shading needs to know of the nearest hit of each ray; Shade: what it adds up; gather, gather_same, all_same, normalize_n, face_towards.
 // Needs: lanes.cl, rays.cl.  Reads: nothing.
 
-// Lane-wise reads: `expression` may use the lane number k.
-#define gather(result, expression)                                \
-    {                                                             \
-        real lane_[LANES];                                        \
-        for (int k = 0; k < LANES; k++) lane_[k] = (expression);  \
-        result = load_lanes(lane_);                               \
+// Lane-wise reads: `expression` may use the lane number k. Unrolled: a load a lane is no slower than a gather instruction, and what lanes
+// are picked from stays in registers.
+#define gather(result, expression)                                                  \
+    {                                                                               \
+        real lane_[LANES];                                                          \
+        _Pragma("unroll") for (int k = 0; k < LANES; k++) lane_[k] = (expression);  \
+        result = load_lanes(lane_);                                                 \
     }
 
 // The same where `same` says that all lanes read the same: packets that meet one surface are most, and one load is cheaper than many.

@@ -16,10 +16,12 @@ HOT void hit_surface(const Geometry *geometry, global const Frame *frame, global
     for (int a = 0; a < 3; a++) hit->point[a] = ray_point(rays, t, a);
     hit->error = (R(8.0) * UNIT_ROUNDOFF) * (rays->scale + t);
     lane_int record[LANES];
+    #pragma unroll
     for (int k = 0; k < LANES; k++) record[k] = hit->slot[k] < frame->triangle_slots ? hit->slot[k] : 0;
     const int one_record = all_same(record);
     if (one_record) store_lanes((mask_n)surfaces[record[0]].material, hit->material);
     else
+        #pragma unroll
         for (int k = 0; k < LANES; k++) hit->material[k] = surfaces[record[k]].material;
     // Unrolled, so that what no effect asks for is not loaded.
     #pragma unroll
