@@ -1,8 +1,10 @@
-// Provides: scene_trace: one ray through the wide trees of all objects, for the closest or for any hit; kernel prepare_blocks.
-// Needs: lanes.cl (LANES 1), rays.cl, structs, geometry.cl, one triangle_*.cl.  Reads: BLOCK (16, 8 or 4), STACK_SIZE.
+// Provides: scene_trace: one ray through the wide trees of all objects, for the closest or for any hit; kernels
+//           prepare_blocks and prepare_boxes.
+// Needs: lanes.cl (LANES 1), rays.cl, given.cl, structs, geometry.cl, one triangle_*.cl.  Reads: BLOCK (16, 8 or 4), STACK_SIZE (at least
+// the depth of the deepest wide tree).
 //
-// A vector holds one number of all children of a node, or of all triangles of a block. What it keeps of a block goes one by one through
-// triangle_test, which decides: what is left out here is what that would refuse.
+// A vector holds one number of all children of a node, or of all triangles of a block. What is left out of a block is what triangle_test would
+// refuse; a lone triangle that it would surely accept is; all else goes through it one by one.
 
 typedef PASTE(REAL_NAME, BLOCK) block_n;
 typedef PASTE(LANE_INT_NAME, BLOCK) block_mask;

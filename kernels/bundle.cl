@@ -100,7 +100,9 @@ HOT uint bundle_live(global const Block *block, const Bundle *bundle, const Bund
     return block_bits(~(enter > leave));
 }
 
-HOT real bundle_block(const Geometry *geometry, global const Block *block, const Rays *rays, int any_hit, const Bundle *bundle, BundleRays *all, Hits *hits) {
+// Tests the block for the rays that meet its box; the distance that no ray still looks beyond.
+HOT real bundle_block(const Geometry *geometry, global const Block *block, const Rays *rays, int any_hit, const Bundle *bundle, BundleRays *all,
+                      Hits *hits) {
     real t_max = (real)-INFINITY;
     for (int first = 0; first < RUN; first += BLOCK) {
         for (uint bits = bundle_live(block, bundle, all, first); bits; bits &= bits - 1) {
@@ -113,7 +115,7 @@ HOT real bundle_block(const Geometry *geometry, global const Block *block, const
     return t_max;
 }
 
-// Rays of one object, as blocks_trace has them one by one.
+// Rays through the wide tree of one object.
 HOT void bundle_object(const Geometry *geometry, global const Object *object, const Rays *rays, int count, int any_hit, Hits *hits) {
     Bundle bundle;
     BundleRays all;

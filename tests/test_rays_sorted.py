@@ -142,16 +142,17 @@ def test_rays_of_a_camera_are_in_order_and_scattered_ones_are_not() -> None:
     assert not ray_sort.in_order_already(np.full((40_000, 3), np.nan), np.full((40_000, 3), np.nan), 1.0)
 
 
+@pytest.mark.parametrize("without", ["__AVX512DQ__", "__AVX__"])
 @pytest.mark.parametrize("width", [4, 8, 16])
 @pytest.mark.parametrize("rung", ["exact", "double"])
 def test_blocks_of_any_width_without_instructions_of_their_own_answer_the_same(
-    rung: str, width: int, monkeypatch: pytest.MonkeyPatch
+    rung: str, width: int, without: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The portable text of blocks.cl, which other processors compile, against the one for this machine."""
     mesh, (origins, directions) = rabbit_like(1000), scattered(3000, 5)
     expected = clrt.RayCaster(mesh, precision=rung).first_hit(origins, directions)
     compose = program.compose
-    monkeypatch.setattr(program, "compose", lambda *a, **k: "#undef __AVX512DQ__\n#undef __AVX__\n" + compose(*a, **k))
+    monkeypatch.setattr(program, "compose", lambda *a, **k: f"#undef __AVX512DQ__\n#undef {without}\n" + compose(*a, **k))
     monkeypatch.setattr(Precision, "lanes", lambda self, float_lanes: width)
     caster = clrt.RayCaster(mesh, precision=rung)
     assert caster.first_hit(origins, directions).tobytes() == expected.tobytes()

@@ -42,7 +42,7 @@ TILE = (16, 8)  #: pixels of a tile, width and height: whole packets of any size
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
 RUN = 32  #: rays of a work-item in arrays of rays
-SORT_BITS = 3  #: an axis, of the grid of origins by which rays are sorted; measured: more change nothing
+SORT_BITS = 3  #: an axis, of the grid of origins by which rays are sorted; measured: more bits save nothing
 MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
 #: what stands at a place where no effect adds anything
 _DEFAULTS = {"trace": "        scene_trace(&geometry, &rays, 1, 0, &hits);", "next": "        break;",
