@@ -10,6 +10,7 @@ import pytest
 from clrt.bench import asm, disassembly
 from clrt.bench.disassembly import functions, inner_loops
 from clrt.device.context import POCL, list_devices
+from clrt.errors import ClrtError
 from clrt.generate import make
 
 #: an inner loop (two blocks, one of them left for a rare call) inside an outer one, as GNU's objdump prints it
@@ -81,7 +82,7 @@ def test_what_llvm_prints_is_read_the_same() -> None:
 
 def test_without_a_disassembler_one_is_asked_for(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(disassembly.ClrtError, match="install binutils"):
+    with pytest.raises(ClrtError, match="install binutils"):
         disassembly.disassemble(tmp_path / "render.so")
 
 
