@@ -20,9 +20,7 @@ from clrt.errors import ClrtError, LimitError
 from clrt.image.error_map import save_error_map, scale_of
 from clrt.scene.build import parse_scene
 
-EDGES = (
-    "E 0 0 -1\nV 0 0 1\nF 45\nR 160 96\nL 5 5 -5\nbackground 0.5 0.5 0.5\nM 1 0.5 0.5 1 0 0 1 0\nT -0.4 -1 2  0.2 -1.1 2  0.1 0.3 2\n"
-)
+EDGES = "E 0 0 -1\nV 0 0 1\nF 45\nR 160 96\nL 5 5 -5\nbackground 0.5 0.5 0.5\nM 1 0.5 0.5 1 0 0 1 0\nT -0.4 -1 2  0.2 -1.1 2  0.1 0.3 2\n"
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +109,18 @@ def test_no_time_at_all_gives_a_picture_of_few_samples(shadow: Renders) -> None:
     assert outcome.error.high == np.inf
 
 
+@pytest.mark.parametrize("seconds", [1e-6, 1.0])
+def test_flat_parts_keep_their_brightness_however_short_the_time(seconds: float) -> None:
+    """No edge is in sight of the pixels on the right: what they have is one sample, which no time for more must not dim."""
+    image = clrt.render(parse_scene(EDGES), within=seconds)
+    assert (image.pixels[:, -48:] == 0.5).all()
+    assert image.standard_error is not None
+    assert (image.standard_error[:, -48:] == 0.0).all()
+    assert image.stats is not None
+    assert image.stats.accuracy is not None
+    assert image.stats.accuracy["samples"]["least"] == 1
+
+
 def test_error_comes_before_a_longer_time(shadow: Renders) -> None:
     start = time.perf_counter()
     outcome = shadow.run(3, Goal(error=0.05, deadline=start + 60.0))
@@ -132,6 +142,34 @@ def test_scene_without_sampled_effects_is_refined_at_edges_alone() -> None:
     error = float(np.sqrt(((image.pixels - fine.astype(float)) ** 2).mean()) / fine.mean())
     assert error < 0.005
     assert (image.pixels != flat).any()
+
+
+def test_picture_of_one_pixel_without_sampled_effects_is_sampled() -> None:
+    """It has no neighbour that differs, but an edge in it."""
+    scene = parse_scene("E 0 0 -1\nV 0 0 1\nF 45\nR 1 1\nL 5 5 -5\nM 1 0.5 0.5 1 0 0 1 0\nT -9 -9 2  9 -9 2  9 9 2\n")
+    image = clrt.render(scene, within=0.2)
+    fine = clrt.render(scene, samples=4096).pixels
+    np.testing.assert_allclose(image.pixels, fine, rtol=0.03)
+    assert 0.1 < fine.max() < 0.9  # its centre is black or white
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("text", ["background 0 0 0\n", "background 1 1 1\n", "background 0.5 0.5 0.5\n"])
+@pytest.mark.parametrize("size", [(1, 1), (17, 9)])
+def test_pictures_without_noise_are_without_error_and_without_warnings(text: str, size: tuple[int, int]) -> None:
+    image = clrt.render(
+        parse_scene("E 0 0 0\nV 0 0 1\nF 45\nR 16 8\nL 5 5 -5\nM 1 1 1 0 0.5 0 1 0\nS 0 0 -5 1\n" + text), size=size, error=0.01
+    )
+    assert image.stats is not None
+    assert image.stats.accuracy is not None
+    assert image.stats.accuracy["error"] == {"value": 0.0, "low": 0.0, "high": 0.0}
+    assert image.stats.accuracy["met"]
+
+
+@pytest.mark.filterwarnings("error")
+def test_pictures_that_fill_no_tile_are_without_warnings() -> None:
+    """What the device has beside the picture is nothing in particular."""
+    assert np.isfinite(clrt.render(soft_shadow(), size=(17, 9), error=0.1).pixels).all()
 
 
 def test_rays_are_counted_as_they_were_launched() -> None:

@@ -20,6 +20,16 @@ def test_quantiles_of_f_are_those_of_the_table(first: int, second: int, high: fl
     assert f_quantile(-Z95, second, first) == pytest.approx(1.0 / high, rel=0.02)  # F(a, b) and 1 / F(b, a) are the same
 
 
+def test_standard_error_of_what_is_very_bright_or_very_dark_is_a_number() -> None:
+    """Its square has no place in a float32."""
+    grid = Grid(16, 8)
+    for scale in (1e30, 1e-30):
+        values = np.broadcast_to(scale * np.array([1.0, 1.1]).reshape(2, 1, 1, 1, 1), (2, 1, 8, 16, 3))
+        ledger = Ledger(grid, 2)
+        ledger.put(np.arange(1), 0, moments(values, grid.inside, grid.sides))
+        np.testing.assert_allclose(ledger.picture(np.zeros((2, 1), np.int64))[1], 0.05 * scale, rtol=1e-5)
+
+
 def test_too_few_degrees_of_freedom_have_no_upper_end() -> None:
     assert f_quantile(Z95, 0.1, 0.6) == np.inf
     assert error_interval(1.0, 100.0, 6).high == np.inf
@@ -58,8 +68,8 @@ def test_moments_are_those_of_numpy_and_leave_out_what_is_no_number() -> None:
     inside[0, :, 9:] = False
     found = moments(values, inside, grid.sides)
     np.testing.assert_allclose(found.mean[0], values[:, 0].mean(0), rtol=1e-5, atol=1e-6)
-    np.testing.assert_allclose(found.variance[0, :, :9], values[:, 0, :, :9].var(0, ddof=1) / MAP_REPLICATES, rtol=1e-5)
-    assert (found.variance[0, :, 9:] == 0.0).all()
+    np.testing.assert_allclose(found.error[0, :, :9], values[:, 0, :, :9].std(0, ddof=1) / MAP_REPLICATES**0.5, rtol=1e-5)
+    assert (found.error[0, :, 9:] == 0.0).all()
     assert found.bad.sum(0).tolist() == [0, 1]
     y, x = np.indices((8, 16))
     for side in (0, 1):

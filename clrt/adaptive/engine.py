@@ -102,7 +102,7 @@ class Engine:
         """One sample through each pixel's centre; tiles without an edge keep it. The others are returned."""
         self.replicates.centre(tiles)
         picture = self.replicates.means(0, 1)
-        differs = np.zeros(picture.shape[:2], bool)
+        differs = np.full(picture.shape[:2], picture.shape[:2] == (1, 1))  # a lone pixel has no neighbour to tell what is in it
         for axis in (0, 1):
             close = np.asarray(np.abs(np.diff(picture, axis=axis)) <= contrast * abs(float(picture.mean())))
             apart = ~close.all(-1)
@@ -121,7 +121,7 @@ class Engine:
         """Level 0 of these tiles; how many replicates there was time for."""
         count = self.replicates.count
         for i in range(count):
-            if i and i * self._left() < self.spent:
+            if i and tiles.size and i * self._left() < self.spent:
                 return i
             self._pilot_replicate(tiles, i)
             self.tell(self._fraction(0.02 * (i + 1) / count))
@@ -144,7 +144,8 @@ class Engine:
         values = self.replicates.values(tiles, int(self.ledger.samples(level)))
         before = self.before[:, tiles] if level > 0 else None
         self.ledger.put(tiles, level, moments(values, self.grid.inside[tiles], self.grid.sides, before))
-        self.before[:, tiles] = values
+        with np.errstate(invalid="ignore", over="ignore"):  # beside the picture there may be anything
+            self.before[:, tiles] = values
 
     def _extend(self, tiles: IntArray) -> bool:
         """The next level of these tiles; False where there is no time for all."""
@@ -201,11 +202,11 @@ class Engine:
         error = self.ledger.error(levels)
         if self.goal.error is not None:
             met = met and bool(error.value <= self.goal.error)
-        return Outcome(pixels, standard_error, error, self._samples(), self.forecast, met)
+        samples = self._samples(self.ledger.samples(self.ledger.reached) * self.replicates.count)
+        return Outcome(pixels, standard_error, error, samples, self.forecast, met)
 
-    def _samples(self) -> tuple[int, float, int]:
-        """Of a pixel that were traced, also those that only decided."""
-        count = self.ledger.samples(self.ledger.reached) * self.replicates.count
+    def _samples(self, count: IntArray) -> tuple[int, float, int]:
+        """Least, mean and most of a pixel that were traced, also those that only decided; count : (tiles,) in all replicates."""
         if self.contrast is not None:
             count = count + 1
             count[self.ledger.closed] = 1
@@ -213,11 +214,12 @@ class Engine:
 
     def _short(self, taken: int) -> Outcome:
         """No time for all replicates: the mean of those there are, with what they tell of the error."""
-        values = np.stack([self.replicates.means(i, self.ledger.first) for i in range(taken)])
-        pixels, count = values.mean(axis=0), taken * self.ledger.first
-        samples = (count, float(count), count)
+        closed = self.grid.picture(np.broadcast_to(self.ledger.closed[:, None, None, None], (*self.grid.inside.shape, 1)))
+        still, _ = self.ledger.picture(np.zeros((2, self.grid.count), np.int64))
+        values = np.stack([np.where(closed, still, self.replicates.means(i, self.ledger.first)) for i in range(taken)])
+        pixels, samples = values.mean(axis=0), self._samples(np.full(self.grid.count, taken * self.ledger.first))
         if taken == 1:
-            unknown = np.full(pixels.shape, np.inf, np.float32)
+            unknown = np.broadcast_to(np.where(closed, 0.0, np.inf), pixels.shape).astype(np.float32)
             return Outcome(pixels.astype(np.float32), unknown, Interval(np.inf, 0.0, np.inf), samples, None, self.goal.error is None)
         variance = values.var(axis=0, ddof=1) / taken
         value = float(np.sqrt(variance.mean()) / max(abs(float(pixels.mean())), np.finfo(float).tiny))

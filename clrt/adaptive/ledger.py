@@ -101,15 +101,15 @@ class Ledger:
     def picture(self, levels: IntArray) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Mean and standard error, (height, width, 3), with side s of tile t at levels[s, t]."""
         shape = (*self.grid.inside.shape, 3)
-        mean, variance = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
+        mean, error = np.zeros(shape, np.float32), np.zeros(shape, np.float32)
         for level, blocks in enumerate(self._blocks):
             at, block = (levels == level), self._block[level]
             for number, found in enumerate(blocks):
                 tiles = np.flatnonzero(at.any(0) & (block == number))
                 row, both = self._row[level][tiles], at[:, tiles].all(0)
-                mean[tiles[both]], variance[tiles[both]] = found.mean[row[both]], found.variance[row[both]]
+                mean[tiles[both]], error[tiles[both]] = found.mean[row[both]], found.error[row[both]]
                 for side, pixels in enumerate(self.grid.sides):
                     one = at[side, tiles] & ~both
-                    for of, to in ((found.mean, mean), (found.variance, variance)):
+                    for of, to in ((found.mean, mean), (found.error, error)):
                         to[tiles[one][:, None], pixels] = of[row[one][:, None], pixels]
-        return self.grid.picture(mean), np.sqrt(self.grid.picture(variance))
+        return self.grid.picture(mean), self.grid.picture(error)

@@ -15,14 +15,14 @@ BoolArray = NDArray[np.bool_]
 class Moments:
     """Of some tiles at one number of samples.
 
-    mean, variance : (n, th, tw, 3) float32, of each pixel over replicates, and the variance of that mean
+    mean, error : (n, th, tw, 3) float32, of each pixel over replicates, and the standard error of that mean
     total, noise : (2, n) sums over a side's pixels and channels of the mean and of its variance
     square : (2, n) sums over a side's pixels of the squared covariances of channels
     bad : (2, n) pixels that are no finite numbers; they are in none of the sums
     """
 
     mean: NDArray[np.float32]
-    variance: NDArray[np.float32]
+    error: NDArray[np.float32]
     total: FloatArray
     noise: FloatArray
     square: FloatArray
@@ -52,7 +52,7 @@ def moments(values: FloatArray, inside: BoolArray, sides: BoolArray, before: NDA
     if count == 2 and before is not None:  # either may be too small: one where noise is not normal, one where it narrows to fewer pixels
         square = np.maximum(square, _squares_of_steps(np.where(good[..., None], values - before, 0.0), side @ _flat(trace), side))
     with np.errstate(over="ignore"):
-        kept = mean.astype(np.float32), variance.astype(np.float32)
+        kept = mean.astype(np.float32), np.sqrt(variance).astype(np.float32)
     total, noise, bad = (side @ _flat(a) for a in (bright, trace, (inside & ~finite).astype(np.float64)))
     return Moments(*kept, total, noise, np.maximum(square, 0.0), bad)
 

@@ -22,6 +22,7 @@ _OWN = 0.4  #: weight of a tile's own power beside that of all
 _PACE = 0.1  #: relative: how well the time of a sample is known
 _SLOPE = 0.12  #: of a slope's change from the pilot to the end, measured over the scenes of docs/error.md
 _MOST_STEPS = 400
+_BLACK = float(np.finfo(float).tiny)  #: mean of a picture without light, so that an error can be divided by it
 
 
 @dataclass(frozen=True)
@@ -83,13 +84,13 @@ class Outlook:
         noise, levels = ledger.at(ledger.noise, walk.levels).copy(), walk.levels.copy()
         start = noise.copy()
         numbers = float(ledger.numbers().sum())
-        scale = numbers * max(abs(float(ledger.at(ledger.total, walk.levels).sum())) / numbers, np.finfo(float).tiny) ** 2
+        mean = max(abs(float(ledger.at(ledger.total, walk.levels).sum())) / numbers, _BLACK)
         now = ledger.side_error(0, walk.levels[0])
         margin = now.high / now.value if now.value > 0.0 and now.high < np.inf else 1.0
         there, time = ledger.reached.copy(), self.spent
         size = np.maximum(ledger.pixels, 1) * 3.0
         most = np.where(ledger.closed, 0, walk.most)
-        best = (time, float(np.sqrt(noise.sum() / scale)))
+        best = (time, float(np.sqrt(noise.sum() / numbers)) / mean)
         for step in range(walk.step + 1, walk.step + 1 + _MOST_STEPS):
             if error is not None and best[1] * margin <= error:
                 break
@@ -100,7 +101,7 @@ class Outlook:
             rising = [int(ledger.samples(level)) for level in range(int(higher.max())) if ((there <= level) & (higher > level)).any()]
             time += pace * (float(np.sum(self.cost * (ledger.samples(higher) - ledger.samples(there)))) + self.overhead * len(rising))
             there = higher
-            reached = float(np.sqrt(noise.sum() / scale))
+            reached = float(np.sqrt(noise.sum() / numbers)) / mean
             if seconds is not None and time > seconds:
                 share = (seconds - best[0]) / max(time - best[0], 1e-12)
                 return max(seconds, self.spent), best[1] + (reached - best[1]) * min(max(share, 0.0), 1.0)

@@ -96,7 +96,10 @@ class Request:
 def check_sampled(features: Features) -> None:
     """Raises ClrtError where the program draws nothing, so that nothing can be said of an error."""
     if not any(f.name == "sampling" for f in features.active):
-        raise ClrtError("nothing is sampled without the effect 'samples', so there is no error to ask for; leave out error and within")
+        raise ClrtError(
+            "nothing is sampled without the effect 'samples', so there is no error to ask for; "
+            "give more than one sample, or leave out error, within and the standard error"
+        )
 
 
 def sample(
