@@ -67,6 +67,8 @@ render_packet(const int column, const int row, global const Frame *frame, global
     //@ end
 }
 
+#define STRIP 16
+
 // The hint keeps a compiler's own vectoriser (Intel's) off lanes that are vectors already: it would take seconds, for slower code.
 kernel __attribute__((vec_type_hint(real_n)))
 void render(global const Frame *frame, global const int2 *nodes, global const int *indices, global const Triangle *triangles,
@@ -74,7 +76,12 @@ void render(global const Frame *frame, global const int2 *nodes, global const in
             global const Surface *surfaces, global const Material *materials, int first_row, int end_row, global float *film
             //@ parameters
 ) {
-    int column = get_global_id(0) * PACKET_WIDTH, row = first_row + get_global_id(1) * PACKET_HEIGHT;
+    // Groups are taken column by column in strips of STRIP groups: what comes soon after is near, and finds the same triangles in the caches.
+    const int across = get_num_groups(0), group = get_group_id(1) * across + get_group_id(0), strip = group / (across * STRIP);
+    const int high = min(STRIP, (int)get_num_groups(1) - strip * STRIP), place = group - strip * across * STRIP;
+    const int group_x = place / high, group_y = strip * STRIP + place % high;
+    int column = (group_x * get_local_size(0) + get_local_id(0)) * PACKET_WIDTH;
+    int row = first_row + (group_y * get_local_size(1) + get_local_id(1)) * PACKET_HEIGHT;
     //@ packet
     if (column >= frame->width || row >= end_row) return;
     //@ repeat

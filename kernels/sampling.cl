@@ -3,8 +3,9 @@
 //
 // `sample_range` holds the first sample and the one behind the last, all of which a launch adds up pixel by pixel, then the number of tiles;
 // none: rows as they are launched. Of each tile four words follow: column and row of its first pixel, which are multiples of a tile's width
-// and height, the seed, and the place of its sums, counted in tiles: there they lie tile by tile. Sums are taken in float64, sample after sample, so they do not depend on how the picture is cut into launches;
-// after n additions the relative error is below n 2^-53.
+// and height, the seed, and the place of its sums, counted in tiles: there they lie tile by tile.
+// Sums are taken in float64, sample after sample, so they do not depend on how the picture is cut into launches; after n additions the
+// relative error is below n 2^-53.
 
 // The rays of camera_rays, moved from the pixel's centre and the eye by what effects add. `extent` is as in rays_prepare.
 HOT void sampling_camera(global const Frame *frame, int column, int row, uint sample, uint seed, Rays *rays) {
