@@ -20,7 +20,7 @@ from clrt.cli.main import cli
 from clrt.errors import ClrtError
 from clrt.scene.build import load_scene
 from clrt.scene.model import Indirect, Scene
-from clrt.study import measure_samples, run, store, verdict
+from clrt.study import measure_samples, reference, run, store, verdict
 from clrt.study.compare import compare
 from clrt.study.plan import QUICK, Plan
 from clrt.study.schema import KEYS, ROWS, faults
@@ -132,6 +132,32 @@ def test_verdict_claims_no_difference_where_intervals_meet() -> None:
     assert "no measurably other time" in verdict.sentences(study)[0]
     cost.update(low=1.02)
     assert "takes 1.04x (1.02 to 1.08) the time of fast" in verdict.sentences(study)[0]
+
+
+def test_verdict_names_a_longest_phase_only_where_intervals_part() -> None:
+    study = study_example.study()
+    assert "the longest phase is trees: " in verdict.sentences(study)[-1]
+    study["phases"]["rows"][5]["seconds"].update(high=1.95)
+    assert "the longest phase is by its median, but not surely, trees: " in verdict.sentences(study)[-1]
+
+
+def test_next_digit_has_its_interval() -> None:
+    study = study_example.study()
+    last = study["samples"]["rows"][-1]
+    last["seconds"].update(median=0.2, low=0.1, high=0.3)
+    study["samples"]["slope"] = {"median": -0.5, "low": -1.0, "high": -0.25, "unit": "log error / log samples", "runs": 10}
+    (told,) = (line for line in verdict.sentences(study) if line.startswith("The next digit"))
+    assert "takes 100x (10 to 10,000) the samples" in told
+    assert "about 20,000 ms (1,000 to 3,000,000)" in told
+    study["samples"]["slope"].update(high=-0.001)  # 10 to the 1000th
+    assert not any(line.startswith("The next digit") for line in verdict.sentences(study))
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 and no more of it", b"no archive"])
+def test_damaged_reference_is_rendered_again(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / reference.FILE
+    path.write_bytes(content)
+    assert reference._kept(path, "key") is None
 
 
 def _fake(part: str, log: list[str]) -> Callable[..., dict[str, Any]]:

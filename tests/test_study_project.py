@@ -12,7 +12,8 @@ import study_example
 from clrt.errors import ClrtError
 from clrt.scene.build import load_scene
 from clrt.study import project, store
-from clrt.study.project_page import digit, page
+from clrt.study.project_page import page
+from clrt.study.verdict import digit
 
 
 def result(name: str, **changes: Any) -> dict[str, Any]:
@@ -25,6 +26,7 @@ def result(name: str, **changes: Any) -> dict[str, Any]:
 def test_a_tenth_of_the_error_takes_a_hundred_times_the_random_samples() -> None:
     assert digit({"median": -0.5, "low": -1.0, "high": -0.25}) == pytest.approx((100.0, 10.0, 10_000.0))
     assert digit({"median": -0.1, "low": -0.3, "high": 0.1}) is None
+    assert digit({"median": -0.1, "low": -0.3, "high": -0.001}) is None  # 10^1000 times
 
 
 def test_page_has_each_scene_its_cost_and_its_verdict() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from clrt.study.verdict import digit
+
 Result = dict[str, Any]
 _RANDOM = -0.5  #: the slope of random sampling
 
@@ -38,14 +40,6 @@ def text_of(value: dict[str, Any] | None, factor: float = 1.0, digits: int = 3) 
         return "-"
     median, low, high = (f"{factor * value[key]:.{digits}g}" for key in ("median", "low", "high"))
     return median if value["low"] == value["high"] else f"{median} ({low} to {high})"
-
-
-def digit(slope: dict[str, Any]) -> tuple[float, float, float] | None:
-    """How many times the samples a tenth of the error takes, 10^(-1 / slope), and its bounds; None where the error does not surely fall."""
-    if slope["high"] >= 0.0:
-        return None
-    median, low, high = (10.0 ** (-1.0 / slope[key]) for key in ("median", "low", "high"))
-    return median, min(low, high), max(low, high)
 
 
 def _digits(results: list[Result]) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -89,5 +90,5 @@ def _kept(path: Path, wanted: str) -> FloatArray | None:
     try:
         with np.load(path, allow_pickle=False) as file:
             return np.asarray(file["batches"], np.float64) if str(file["key"]) == wanted else None
-    except (OSError, ValueError, KeyError):
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None

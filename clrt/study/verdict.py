@@ -7,6 +7,7 @@ from typing import Any
 
 Row = dict[str, Any]
 _STEP = 4  #: samples of two points that are compared, one over the other
+_FLATTEST = -0.01  #: a slope of error over samples above which the next digit takes more than 10^100 times the samples
 
 
 def sentences(study: dict[str, Any]) -> list[str]:
@@ -18,6 +19,14 @@ def sentences(study: dict[str, Any]) -> list[str]:
 def ratio(a: Row, b: Row) -> tuple[float, float, float]:
     """a over b: of the medians, and its extremes within both intervals. For positive numbers."""
     return a["median"] / b["median"], a["low"] / b["high"], a["high"] / b["low"]
+
+
+def digit(slope: Row) -> tuple[float, float, float] | None:
+    """How many times the samples a tenth of the error takes, with its bounds; None where it does not surely fall, or out of all reach."""
+    if slope["high"] > _FLATTEST:
+        return None
+    median, low, high = (10.0 ** (-1.0 / slope[key]) for key in ("median", "low", "high"))
+    return median, low, high
 
 
 def _rows(study: dict[str, Any], part: str) -> list[Row]:
@@ -87,10 +96,12 @@ def _samples(study: dict[str, Any]) -> Iterator[str]:
     slope = study["samples"].get("slope")
     if slope is not None:
         yield f"The error falls with the samples to the power {_interval(slope)}; random sampling has -0.5."
-        if slope["high"] < 0.0 and _positive(last["rmse"], last["seconds"]):
-            digit = 10.0 ** (-1.0 / slope["median"])
-            yield (f"The next digit, a tenth of the error, so takes {short(digit)}x the samples: from {last['rmse']['median']:.2g} at "
-                   f"{_milliseconds(last['seconds'])} about {short(digit * last['seconds']['median'])} s, if the slope holds.")  # fmt: skip
+        tenth = digit(slope)
+        if tenth is not None and _positive(last["rmse"], last["seconds"]):
+            ends = zip(("median", "low", "high"), tenth, strict=True)
+            whole = {end: times * last["seconds"][end] for end, times in ends}
+            yield (f"The next digit, a tenth of the error, so takes {_times(*tenth)} the samples: from {last['rmse']['median']:.2g} at "
+                   f"{_milliseconds(last['seconds'])} about {_milliseconds(whole)}, if the slope holds.")  # fmt: skip
     floor, made = study["samples"].get("floor"), study["samples"].get("reference")
     if floor is not None and made is not None:
         yield (f"The reference has {made['samples']:,} samples in {made['rung']}, {made['times_largest']}x those of the largest point, "
@@ -148,4 +159,7 @@ def _phases(study: dict[str, Any]) -> Iterator[str]:
     rows = [row for row in _rows(study, "phases") if row.get("seconds") and row["phase"] != "compile cold"]
     if rows:
         longest = max(rows, key=lambda row: float(row["seconds"]["median"]))
-        yield f"Of a run with compiled programs at hand the longest phase is {longest['phase']}: {_milliseconds(longest['seconds'])}."
+        others = [row["seconds"]["high"] for row in rows if row is not longest]
+        sure = "" if all(longest["seconds"]["low"] > high for high in others) else " by its median, but not surely,"
+        yield (f"Of a run with compiled programs at hand the longest phase is{sure} {longest['phase']}: "
+               f"{_milliseconds(longest['seconds'])}.")  # fmt: skip
