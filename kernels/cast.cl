@@ -83,7 +83,7 @@ void cast(global const WideNode *wide, global const Block *blocks, global const 
     }
     for (int i = first; i < end; i++) {
         if (order && i + RUN < count) ray_given_ahead(&given, order[i + RUN]);
-        if (mode == FIRST_HIT) fetch_ahead(records + (order ? order[i] : i), sizeof(HitRecord), 1);
+        if (mode == FIRST_HIT) fetch_bytes_ahead(records + (order ? order[i] : i), sizeof(HitRecord), 1);
         Hits hits;
         hits.t = rays[i - first].t_max;
         hits.slot = -1;
@@ -99,8 +99,8 @@ void cast(global const WideNode *wide, global const Block *blocks, global const 
     }
     for (int i = 0; mode == FIRST_HIT && i < end - first; i++) {
         if (found[i].slot < 0) continue;
-        fetch_ahead(vertices + 9 * (size_t)found[i].slot, 9 * sizeof(double), 0);
-        fetch_ahead(sources + found[i].slot, sizeof(HitSource), 0);
+        fetch_bytes_ahead(vertices + 9 * (size_t)found[i].slot, 9 * sizeof(double), 0);
+        fetch_bytes_ahead(sources + found[i].slot, sizeof(HitSource), 0);
     }
     for (int i = first; i < end; i++) {
         const int number = order ? order[i] : i;

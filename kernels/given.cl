@@ -52,17 +52,17 @@ HOT int ray_given_scaled(const GivenRays *rays, size_t i, GivenRay *ray) {
 
 // Asks for memory ahead of its use, to read or to write it; rays in sorted order lie anywhere in the caller's arrays.
 #ifdef __clang__
-#define fetch_ahead(pointer, bytes, write)                                              \
+#define fetch_bytes_ahead(pointer, bytes, write)                                              \
     {                                                                                   \
         __builtin_prefetch((const void *)(size_t)(pointer), write);                      \
         __builtin_prefetch((const void *)((size_t)(pointer) + (bytes) - 1), write);       \
     }
 #else
-#define fetch_ahead(pointer, bytes, write)
+#define fetch_bytes_ahead(pointer, bytes, write)
 #endif
 
 HOT void ray_given_ahead(const GivenRays *rays, size_t i) {
     const size_t origin = rays->kinds & 1 ? 12 : 24, direction = rays->kinds & 2 ? 12 : 24;
-    if (!(rays->kinds & 16)) fetch_ahead(rays->origins + origin * i, origin, 0);
-    if (!(rays->kinds & 32)) fetch_ahead(rays->directions + direction * i, direction, 0);
+    if (!(rays->kinds & 16)) fetch_bytes_ahead(rays->origins + origin * i, origin, 0);
+    if (!(rays->kinds & 32)) fetch_bytes_ahead(rays->directions + direction * i, direction, 0);
 }

@@ -101,8 +101,8 @@ def test_adaptive_sampling_of_a_soft_shadow_takes_at_most_six_tenths_of_uniform_
 
     Between both on log axes; in turns. At the wider error the pilot and each look at the tiles weigh more; there the ratio is told alone.
     """
-    renders = Renders(shadow_under_sky().with_size(384, 256), device)
-    truth, _ = renders.truth(2048)
+    renders = Renders(shadow_under_sky().with_size(576, 384), device)
+    truth, _ = renders.truth(1024)
     goal = Goal(error=error)
 
     def error_of(pixels: NDArray[Any]) -> float:

@@ -20,6 +20,7 @@ IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
 
 PILOT = 0.15  #: of the whole that is spent when the forecast is made
+_LOOK_AGAIN = 1.3  #: times the work of the last look ahead, which takes a few milliseconds
 MOST_SAMPLES = 1 << 20  #: of a pixel
 _CHUNK_S = 0.1  #: launches are to take about this long, so that Ctrl-C and progress come between them
 _FIRST_TILES = 32  #: in the first launch, whose speed is not known yet
@@ -72,6 +73,7 @@ class Engine:
         self.ledger = Ledger(self.grid, replicates.count, PILOT_SAMPLES if goal.samples is None else goal.samples // replicates.count)
         self.before = np.zeros((replicates.count, *self.grid.inside.shape, 3), np.float32)  #: means of the last look
         self.forecast: Forecast | None = None
+        self.next_look = 0.0  #: seconds spent, when it is worth while to look ahead again
         self.overhead = replicates.overhead()  #: seconds of a launch
 
     @property
@@ -186,10 +188,14 @@ class Engine:
 
     def _foretell(self) -> None:
         """The forecast, as soon as PILOT of the whole is done."""
-        seconds = None if self.goal.deadline is None else self.spent + max(self._left(), 0.0)
-        found = Outlook(self.ledger, self.walk, self.cost, self.overhead, self.spent).forecast(self.goal.error, seconds)
-        if self.spent >= PILOT * found.seconds.value:
-            self.forecast = as_told(found, self.goal.error)
+        spent = self.spent
+        seconds = None if self.goal.deadline is None else spent + max(self._left(), 0.0)
+        if spent < self.next_look or (self.goal.error is None and seconds is not None and spent < PILOT * seconds):
+            return
+        self.next_look = _LOOK_AGAIN * spent
+        outlook = Outlook(self.ledger, self.walk, self.cost, self.overhead, spent)
+        if spent >= PILOT * outlook.seconds(self.goal.error, seconds):
+            self.forecast = as_told(outlook.forecast(self.goal.error, seconds), self.goal.error)
             self.foretell(self.forecast)
 
     def _fraction(self, least: float = 0.02) -> float:

@@ -56,6 +56,10 @@ class Outlook:
         return Forecast(Interval(time, min(quick, time), max(slow, time)),
                         Interval(reached, min(better, reached) * spread[1], max(worse, reached) * spread[0]))  # fmt: skip
 
+    def seconds(self, error: float | None, seconds: float | None) -> float:
+        """Those of the forecast, without its interval."""
+        return self._run(self._slopes()[0], 1.0, error, seconds)[0]
+
     def _slopes(self) -> tuple[FloatArray, float]:
         """(tiles,): the power of n with which the variance fell last, between the tile's own and that of all; its doubt."""
         ledger, reached = self.ledger, self.ledger.reached

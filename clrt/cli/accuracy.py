@@ -22,7 +22,7 @@ def outcome_lines(stats: RunStats) -> list[tuple[str, str]]:
     accuracy: dict[str, Any] = stats.accuracy or {}
     found, samples = accuracy["error"], accuracy["samples"]
     if found is None:
-        lines = [("error", "not known: there was time for one sample of each pixel")]
+        lines = [("error", "not known: there was time for the samples of one sequence alone, which do not tell")]
     else:
         asked = accuracy["asked_error"]
         verdict = "" if asked is None else f"; asked: {percent(asked)}" + ("" if accuracy["met"] else ", not reached")
@@ -32,8 +32,12 @@ def outcome_lines(stats: RunStats) -> list[tuple[str, str]]:
         lines.append(("foretold", f"{_seconds(told_time)} of rendering; it took {stats.render_s:.3g} s"))
     elif accuracy["asked_within"] is not None and told_error is not None:
         lines.append(("foretold", f"an error of {_percents(told_error)}"))
-    lines.append(("samples", f"{samples['least']:,} to {samples['most']:,} a pixel, {samples['mean']:,.4g} on average"))
+    lines.append(("samples", f"{samples['least']:,} to {samples['most']:,} a pixel, {_mean(samples['mean'])} on average"))
     return lines
+
+
+def _mean(samples: float) -> str:
+    return f"{samples:,.0f}" if samples >= 1000.0 else f"{samples:.4g}"
 
 
 def percent(value: float) -> str:
