@@ -46,7 +46,8 @@ class PartedTree:
 def part(tree: KdTree, points: FloatArray, size: int) -> tuple[PartedTree, Ints]:
     """The tree of `points` (n, 3), the triangles' middles, with at most `size` in a leaf; and the order (n,) of the points in it."""
     axis, child = tree.split_axis.astype(np.int64), tree.child.astype(np.int64)
-    levels, level = [], np.flatnonzero(axis[:1] != LEAF)
+    levels: list[Ints] = []
+    level: Ints = np.flatnonzero(axis[:1] != LEAF)
     while level.size:
         levels.append(level)
         level = (child[level, None] + [0, 1]).ravel()
