@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from clrt.adaptive.intervals import Interval
 from clrt.adaptive.ledger import Ledger
 from clrt.adaptive.moments import flat, moments
+from clrt.adaptive.pace import Pace
 from clrt.adaptive.predict import Forecast, Outlook, as_told
 from clrt.adaptive.replicates import Replicates
 from clrt.adaptive.schedule import Walk
@@ -69,12 +70,13 @@ class Engine:
         self.replicates, self.goal, self.tell, self.foretell, self.contrast = replicates, goal, tell, foretell, contrast
         self.grid = replicates.grid
         self.start = time.perf_counter()
-        self.cost: FloatArray = np.zeros(self.grid.count)  #: seconds of one sample of a tile, all replicates
+        self.cost: FloatArray = np.zeros(self.grid.count)  #: seconds of one sample of a tile, all replicates, as the pilot took
         self.ledger = Ledger(self.grid, replicates.count, PILOT_SAMPLES if goal.samples is None else goal.samples // replicates.count)
         self.before = np.zeros((replicates.count, *self.grid.inside.shape, 3), np.float32)  #: means of the last look
         self.forecast: Forecast | None = None
         self.next_look = 0.0  #: seconds spent, when it is worth while to look ahead again
-        self.overhead = replicates.overhead()  #: seconds of a launch
+        self.overhead = replicates.overhead()  #: seconds of a launch that traces nothing
+        self.pace = Pace(self.overhead)
 
     @property
     def spent(self) -> float:
@@ -156,15 +158,17 @@ class Engine:
             same = tiles[reached == level]
             samples = int(self.ledger.samples(level))
             while same.size:
-                seconds = np.cumsum(self.cost[same]) * samples
-                part = same[: max(1, int(np.searchsorted(seconds, min(_CHUNK_S, self._left()))))]
-                if float(self.cost[part].sum()) * samples + self.overhead > self._left():
+                fixed, factor = self.pace.line()
+                work = np.cumsum(self.cost[same]) * samples
+                part = same[: max(1, int(np.searchsorted(factor * work, min(_CHUNK_S, self._left() - fixed))))]
+                expected = float(work[len(part) - 1])
+                if self.pace.expected(expected) > self._left():
                     return False
                 begin = time.perf_counter()
                 self._run(part, samples)
                 for few in _parts(part, _READ_TILES):
                     self._look(few, level + 1)
-                self._learn(part, (time.perf_counter() - begin - self.overhead) / samples)
+                self.pace.learn(expected, time.perf_counter() - begin)
                 same = same[len(part) :]
                 self.tell(self._fraction())
         return True
@@ -174,11 +178,6 @@ class Engine:
         step = max(1, min(samples, int(_CHUNK_S / max(float(self.cost[tiles].sum()), 1e-9))))
         for first in range(samples, 2 * samples, step):
             self.replicates.run(tiles, first, min(first + step, 2 * samples))
-
-    def _learn(self, tiles: IntArray, seconds: float) -> None:
-        """Halfway from what was known of the cost of these tiles to what they took together."""
-        before = float(self.cost[tiles].sum())
-        self.cost[tiles] *= 0.5 * (1.0 + max(seconds / before, 0.1)) if before > 0.0 else 1.0
 
     def _met(self, side: int) -> bool:
         if self.forecast is None:
@@ -193,7 +192,8 @@ class Engine:
         if spent < self.next_look or (self.goal.error is None and seconds is not None and spent < PILOT * seconds):
             return
         self.next_look = _LOOK_AGAIN * spent
-        outlook = Outlook(self.ledger, self.walk, self.cost, self.overhead, spent)
+        fixed, factor = self.pace.line()
+        outlook = Outlook(self.ledger, self.walk, factor * self.cost, fixed, spent)
         if spent >= PILOT * outlook.seconds(self.goal.error, seconds):
             self.forecast = as_told(outlook.forecast(self.goal.error, seconds), self.goal.error)
             self.foretell(self.forecast)

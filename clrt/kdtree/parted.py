@@ -50,7 +50,7 @@ def part(tree: KdTree, points: FloatArray, size: int) -> tuple[PartedTree, Ints]
     level: Ints = np.flatnonzero(axis[:1] != LEAF)
     while level.size:
         levels.append(level)
-        level = (child[level, None] + [0, 1]).ravel()
+        level = (child[level, None] + np.arange(2)).ravel()
         level = level[axis[level] != LEAF]
     leaf = _leaf_of(tree, points)
     count = np.bincount(leaf, minlength=len(axis))
