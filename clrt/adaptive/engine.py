@@ -20,7 +20,7 @@ from clrt.adaptive.schedule import Walk
 IntArray = NDArray[np.int64]
 FloatArray = NDArray[np.float64]
 
-PILOT = 0.15  #: of the whole that is spent when the forecast is made
+PILOT = 0.2  #: of the whole that is spent when the forecast is made
 _LOOK_AGAIN = 1.3  #: times the work of the last look ahead, which takes a few milliseconds
 MOST_SAMPLES = 1 << 20  #: of a pixel
 _CHUNK_S = 0.1  #: launches are to take about this long, so that Ctrl-C and progress come between them
