@@ -13,7 +13,7 @@ import clrt
 from clrt.device import kernel_cache
 from clrt.device.context import Device
 from clrt.errors import ClrtError, LimitError
-from clrt.forest import build, choose, pool, subtrees, top
+from clrt.forest import build, choose, machine, pool, subtrees, top
 from clrt.forest.machine import Machine, Store, compiled_before
 from clrt.forest.ticker import LARGE
 from clrt.kdtree import KdTree, build_tree, default_max_depth
@@ -211,11 +211,14 @@ def test_faulty_triangles_are_refused_alike(device: Device, monkeypatch: pytest.
 
 def test_compiled_program_is_noted_until_the_cache_is_emptied(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
+    monkeypatch.setattr(machine, "_ready", set())
     assert not compiled_before(device)
     monkeypatch.setattr(top, "LARGE", 100)
     build.build_forest(Machine(device), sphere(), np.array([len(sphere())]), np.array([20]))
     assert compiled_before(device)
     kernel_cache.clear()
+    assert compiled_before(device)  # this process has it still
+    machine._ready.clear()  # as another process finds it
     assert not compiled_before(device)
 
 

@@ -37,8 +37,8 @@ def source() -> str:
 
 
 def compiled_before(device: Device) -> bool:
-    """Whether PoCL has all kernels for this device in its cache, by the note that was left when they were launched."""
-    return _note(device).exists()
+    """Whether this process has all kernels for this device, or PoCL's cache does, by the note that was left when they were launched."""
+    return device in _ready or _note(device).exists()
 
 
 def is_processor(device: Device) -> bool:
@@ -52,6 +52,9 @@ def _note(device: Device) -> Path:
     info = device.info
     text = "\0".join((source(), info.name, info.platform, info.version, info.driver))
     return kernel_cache.compiled_note(hashlib.sha256(text.encode()).hexdigest()[:16])
+
+
+_ready: set[Device] = set()  #: devices that this process has all kernels for, whatever becomes of the cache
 
 
 @lru_cache(maxsize=1)
@@ -115,6 +118,7 @@ class Machine:
             self.device.queue.finish()
         self._launched.add(name)
         if len(self._launched) == len(_KERNELS):
+            _ready.add(self.device)
             with suppress(OSError):
                 _note(self.device).touch()
 
