@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import errno
 import os
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 _unfinished: set[str] = set()
+_folders: set[str] = set()  #: temporary ones, which go with the process
 
 
 @contextlib.contextmanager
@@ -64,10 +66,27 @@ def _discard(part: str) -> None:
     _unfinished.discard(part)
 
 
+def temporary_folder() -> str:
+    """A new folder that goes when the process ends."""
+    import tempfile  # slow to import, and seldom needed
+
+    folder = tempfile.mkdtemp(prefix="clrt-")
+    _folders.add(folder)
+    return folder
+
+
+@atexit.register
+def _discard_folders() -> None:
+    for folder in tuple(_folders):
+        shutil.rmtree(folder, ignore_errors=True)
+        _folders.discard(folder)
+
+
 def discard_unfinished() -> None:
-    """Remove what is being written: for a process that is about to end without unwinding its stack."""
+    """Remove what is being written, and temporary folders: for a process that is about to end without unwinding its stack."""
     for part in tuple(_unfinished):
         _discard(part)
+    _discard_folders()
 
 
 def check_writable(path: str | PathLike[str]) -> None:

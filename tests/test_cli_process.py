@@ -287,6 +287,15 @@ def test_real_render_counts_every_ray_of_a_scene_whose_rays_are_known(tmp_path: 
     assert files(tmp_path) == ["k.cl", "s.json", "scene.png", "scene.txt"]
 
 
+def test_interrupt_that_the_interpreter_loses_leaves_no_traceback(tmp_path: Path) -> None:
+    # Weak references' callbacks, as imports have them, cannot raise.
+    program = "import os, signal, time, weakref\nfrom clrt.cli import interrupt\ninterrupt.watch()\nclass Thing: ...\nthing = Thing()\n"
+    program += "held = weakref.ref(thing, lambda _: os.kill(os.getpid(), signal.SIGINT))\ndel thing\ntime.sleep(20)\n"
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, cwd=tmp_path, env=child_environment(), capture_output=True, timeout=30, check=False)
+    assert (done.returncode, done.stderr) == (130, b"clrt: interrupted\n")
+
+
 def test_real_render_of_a_device_that_is_not_there_is_one_line_and_2(tmp_path: Path) -> None:
     (tmp_path / "scene.txt").write_text(SCENE)
     done = clrt(tmp_path, "scene.txt", "--device", "no such device")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -88,6 +89,25 @@ def test_folder_is_the_users_or_a_temporary_one(tmp_path: Path, monkeypatch: pyt
     assert str(kernel_cache.choose_folder()).startswith(str(tmp_path / "temporary"))
     monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path / "chosen"))
     assert kernel_cache.choose_folder() == tmp_path / "chosen"
+
+
+def test_full_disk_calls_for_a_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    full = shutil.disk_usage(tmp_path)._replace(free=1 << 20)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: full)
+    monkeypatch.delenv(kernel_cache.VARIABLE, raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "mine"))
+    monkeypatch.setattr(kernel_cache.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    assert str(kernel_cache.choose_folder()).startswith(str(tmp_path / "temporary"))
+
+
+@pytest.mark.parametrize("end", ["interrupt.leave()", "sys.exit()"])
+def test_temporary_folder_goes_with_the_process(tmp_path: Path, end: str) -> None:
+    program = "import os, sys\nfrom clrt.cli import interrupt\nfrom clrt.device import kernel_cache\n"
+    program += f"kernel_cache.use_temporary_folder()\nprint(os.path.isdir(os.environ['{kernel_cache.VARIABLE}']), flush=True)\n{end}\n"
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
+    assert (done.stdout, done.stderr) == ("True\n", "")
+    assert not list(tmp_path.iterdir())
 
 
 def test_temporary_folder_that_is_not_the_users_alone_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

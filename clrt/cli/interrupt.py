@@ -25,6 +25,7 @@ _SHOW_CURSOR = "\x1b[?25h"  # ANSI; the progress display hides it
 
 def watch() -> None:
     """Start the thread. Call it from the main thread."""
+    sys.unraisablehook = _unraisable
     read_end, write_end = os.pipe()
     os.set_blocking(write_end, False)
     signal.set_wakeup_fd(write_end, warn_on_full_buffer=False)
@@ -34,7 +35,15 @@ def watch() -> None:
 def leave() -> NoReturn:
     """End the process now. Not by way of the interpreter's tidying, which waits for kernels that still run."""
     streams.settle()
+    discard_unfinished()
     os._exit(EXIT_CODE)
+
+
+def _unraisable(fault: sys.UnraisableHookArgs) -> None:
+    """Ctrl-C in a callback of the interpreter's own, as there are many in imports, is lost there with a traceback; the thread ends the
+    program all the same."""
+    if not issubclass(fault.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(fault)
 
 
 def _wait(read_end: int) -> None:

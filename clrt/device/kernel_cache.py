@@ -7,7 +7,6 @@ process that is gone means that it died there, and the folder is emptied before 
 
 from __future__ import annotations
 
-import atexit
 import os
 import re
 import shutil
@@ -19,10 +18,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from clrt.files import temporary_folder
+
 VARIABLE = "POCL_CACHE_DIR"
 _lock = threading.Lock()
 _loading = 0  #: threads that are in `loading`
 _LEFT_S = 3600.0  #: seconds after which an empty file is left over
+_ROOM = 16 << 20  #: bytes that a few programs and their kernels take; libraries raise errors of their own where a disk is full
 _MARK = "clrt-loading-"
 _COMPILED = "clrt-compiled-"
 #: entries of PoCL, and notes of them; POCL_CACHE_DIR may name a folder with files of the user's
@@ -32,12 +34,12 @@ _POCLS = re.compile(rf"[A-P]{{2}}|tempfile_\w+|{_COMPILED}\w+")
 def choose_folder() -> Path:
     """The folder that PoCL will use, made if need be; to be called before pyopencl is imported.
 
-    POCL_CACHE_DIR where it is set; else `clrt/pocl` in the user's cache folder, or, where that cannot be written, in a
+    POCL_CACHE_DIR where it is set; else `clrt/pocl` in the user's cache folder, or, where that cannot be written or is full, in a
     temporary one that all processes of the user share. In that case XDG_CACHE_HOME becomes the temporary one, too:
     pyopencl cannot be imported where it cannot keep files of its own.
     """
     home = _home()
-    if not (_writable(home / "clrt" / "pocl") and _writable(home / "pytools")):
+    if not (_writable(home / "clrt" / "pocl") and _writable(home / "pytools") and _roomy(home)):
         home = _temporary_home()
         os.environ["XDG_CACHE_HOME"] = str(home)
     if not os.environ.get(VARIABLE):
@@ -61,9 +63,7 @@ def _sweep(folder: Path) -> None:
 
 def use_temporary_folder() -> None:
     """Has PoCL keep its kernels in a folder that goes when the process ends; to be called before pyopencl is imported."""
-    folder = tempfile.mkdtemp(prefix="clrt-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    os.environ[VARIABLE] = folder
+    os.environ[VARIABLE] = temporary_folder()
 
 
 def own_folder(name: str) -> Path:
@@ -89,9 +89,7 @@ def _temporary_home() -> Path:
         found = shared.lstat()
         if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022:
             return shared
-    own = tempfile.mkdtemp(prefix="clrt-")
-    atexit.register(shutil.rmtree, own, ignore_errors=True)
-    return Path(own)
+    return Path(temporary_folder())
 
 
 def _writable(folder: Path) -> bool:
@@ -100,6 +98,18 @@ def _writable(folder: Path) -> bool:
     except OSError:
         return False
     return os.access(folder, os.W_OK | os.X_OK)
+
+
+def _roomy(folder: Path) -> bool:
+    """Whether the disk has room for what is kept, and the user may fill it: a quota shows only as one writes."""
+    try:
+        if shutil.disk_usage(folder).free < _ROOM:
+            return False
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(1 << 16))
+    except OSError:
+        return False
+    return True
 
 
 def clear() -> None:
