@@ -21,7 +21,7 @@ from clrt.device.context import Device
 from clrt.renderer import run_rows, with_options
 from clrt.scene.build import load_scene
 from clrt.scene.model import Scene
-from clrt.timing import interleave, median_interval
+from clrt.timing import median_interval
 
 pytestmark = pytest.mark.slow
 
@@ -79,7 +79,7 @@ def _foretold(renders: Renders, goal: Goal) -> tuple[Engine, list[Forecast], flo
     return engine, told, engine.spent, outcome.error.value
 
 
-@pytest.mark.xfail(strict=False, reason="not reached yet: docs/error.md, Forecasts, has what was measured")
+@pytest.mark.xfail(strict=False, reason="three to four of five: docs/error.md, Forecasts, has what was measured")
 def test_predictions_are_within_a_fifth_on_four_of_five_scenes(device: Device) -> None:
     times, errors = [], []
     for name, (scene, error) in _five().items():
@@ -99,10 +99,11 @@ def test_predictions_are_within_a_fifth_on_four_of_five_scenes(device: Device) -
 def test_adaptive_sampling_of_a_soft_shadow_takes_at_most_six_tenths_of_uniform_samplings_time(error: float, device: Device) -> None:
     """Uniform sampling by one sequence, as `--samples` has it, with the two powers of two of samples around the same error.
 
-    Between both on log axes; in turns. At the wider error the pilot and each look at the tiles weigh more; there the ratio is told alone.
+    Between both on log axes; in turns. What is asserted is processor time, which other work on the machine does not change; the time on the
+    clock is told beside it. At the wider error the pilot and each look at the tiles weigh more; there the ratio is told alone.
     """
-    renders = Renders(shadow_under_sky().with_size(576, 384), device)
-    truth, _ = renders.truth(1024)
+    renders = Renders(shadow_under_sky().with_size(384, 256), device)
+    truth, _ = renders.truth(2048)
     goal = Goal(error=error)
 
     def error_of(pixels: NDArray[Any]) -> float:
@@ -120,12 +121,23 @@ def test_adaptive_sampling_of_a_soft_shadow_takes_at_most_six_tenths_of_uniform_
     contenders: dict[str, Callable[[], object]] = {
         "adaptive": lambda: renders.run(5, goal), "above": run[above], "below": run[2 * above]
     }  # fmt: skip
-    taken = interleave(contenders, 7)
-    ratios = [a / (u ** (1 - share) * v**share) for a, u, v in zip(*(taken[name].seconds for name in contenders), strict=True)]
-    low, high = median_interval(ratios)
-    print(f"\nsoft shadow at {reached:.3%}: adaptive over uniform sampling: time {np.median(ratios):.2f} ({low:.2f} to {high:.2f}), "
-          f"samples {adaptive.samples[1] / (above * 2**share):.2f}")  # fmt: skip
-    assert np.median(ratios) <= (0.6 if error < 0.001 else 1.3)
+    rounds = [[_seconds(run) for run in contenders.values()] for _ in range(8)][1:]
+
+    def told(clock: int) -> tuple[float, float, float]:
+        ratios = [a[clock] / (u[clock] ** (1 - share) * v[clock] ** share) for a, u, v in rounds]
+        return float(np.median(ratios)), *median_interval(ratios)
+
+    (wall, *ends), (processor, low, high) = told(0), told(1)
+    print(f"\nsoft shadow at {reached:.3%}: adaptive over uniform sampling: processor time {processor:.2f} ({low:.2f} to {high:.2f}), "
+          f"time {wall:.2f} ({ends[0]:.2f} to {ends[1]:.2f}), samples {adaptive.samples[1] / (above * 2**share):.2f}")  # fmt: skip
+    assert processor <= (0.6 if error < 0.001 else 1.3)
+
+
+def _seconds(run: Callable[[], object]) -> tuple[float, float]:
+    """On the clock, and of the processor in all threads."""
+    wall, processor = time.perf_counter(), time.process_time()
+    run()
+    return time.perf_counter() - wall, time.process_time() - processor
 
 
 @pytest.mark.parametrize("name", ["soft shadow", "lens blur"])
