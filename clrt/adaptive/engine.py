@@ -162,7 +162,7 @@ class Engine:
                 work = np.cumsum(self.cost[same]) * samples
                 part = same[: max(1, int(np.searchsorted(factor * work, min(_CHUNK_S, self._left() - fixed))))]
                 expected = float(work[len(part) - 1])
-                if self.pace.expected(expected) > self._left():
+                if fixed + factor * expected > self._left():
                     return False
                 begin = time.perf_counter()
                 self._run(part, samples)

@@ -29,8 +29,3 @@ class Pace:
             factor = (self.count * self.products - self.work * self.seconds) / spread
             fixed = min(max((self.seconds - factor * self.work) / self.count, self.least), self.seconds / self.count)
         return fixed, max((self.seconds - self.count * fixed) / self.work, 0.1)
-
-    def expected(self, work: float) -> float:
-        """Seconds of a launch of this work."""
-        fixed, factor = self.line()
-        return fixed + factor * work

@@ -23,7 +23,6 @@ from clrt.adaptive.ledger import Ledger
 IntArray = NDArray[np.int64]
 
 STEPS = 2  #: a factor 2 of the threshold in so many steps
-MOST_LEVELS = 30
 
 
 def threshold(step: int) -> float:
