@@ -112,10 +112,9 @@ import sys
 import numpy as np
 from pathlib import Path
 from clrt.store import Store
-store, seed = Store(Path(sys.argv[1]), limit=90_000), int(sys.argv[2])
+store, keys = Store(Path(sys.argv[1]), limit=90_000), np.random.default_rng(int(sys.argv[2])).integers(0, 12, 150)
 missed = 0
-for i in range(150):
-    key = (i * 7 + seed) % 12
+for key in keys:
     found = store.get(f"k{key}")
     if found is None:
         missed += 1
@@ -127,10 +126,15 @@ print(missed)
 
 
 def test_processes_at_once_never_meet_half_an_entry(tmp_path: Path) -> None:
-    """Three processes read, write and make room in one folder; each array that comes back is whole, and some do."""
+    """Three processes read, write and make room in one folder; each array that comes back is whole, and some do.
+
+    Keys come in random order: in turn, one more of them than there is room for, a process that runs by itself would find none.
+    """
     command = [sys.executable, "-c", _MANY, str(tmp_path)]
     running = [subprocess.Popen([*command, str(i)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) for i in range(3)]
     ends = [process.communicate(timeout=60) for process in running]
     assert [process.returncode for process in running] == [0, 0, 0], ends
-    assert all(12 < int(out) < 150 for out, _ in ends)
+    missed = [int(out) for out, _ in ends]
+    assert sum(missed) >= 12  # each key was put before it was found
+    assert max(missed) < 100
     assert not list(tmp_path.glob("*.part"))
