@@ -7,18 +7,27 @@
 #define BUNDLE_DIRECTIONS R(0.25)  // spread of directions, summed over the axes, up to which a bundle pays
 #define BUNDLE_ORIGINS R(0.125)    // the same of origins, of the scene's extent
 
-HOT int bundle_coherent(const Rays *rays, int count, real extent) {
-    real spread = (real)0, apart = (real)0;
+// Least and greatest, by axis: of the rays' directions, or of the inverses of these; and of their origins.
+HOT void bundle_bounds(const Rays *rays, int count, const int inverses, real *low, real *high, real *near, real *far) {
     for (int a = 0; a < 3; a++) {
-        real low = rays->direction[a], high = low, near = rays->origin[a], far = near;
+        low[a] = high[a] = inverses ? rays->inverse[a] : rays->direction[a];
+        near[a] = far[a] = rays->origin[a];
         for (int i = 1; i < count; i++) {
-            low = min_n(rays[i].direction[a], low);
-            high = max_n(rays[i].direction[a], high);
-            near = min_n(rays[i].origin[a], near);
-            far = max_n(rays[i].origin[a], far);
+            const real d = inverses ? rays[i].inverse[a] : rays[i].direction[a];
+            low[a] = min_n(d, low[a]);
+            high[a] = max_n(d, high[a]);
+            near[a] = min_n(rays[i].origin[a], near[a]);
+            far[a] = max_n(rays[i].origin[a], far[a]);
         }
-        spread += high - low;
-        apart += far - near;
+    }
+}
+
+HOT int bundle_coherent(const Rays *rays, int count, real extent) {
+    real low[3], high[3], near[3], far[3], spread = (real)0, apart = (real)0;
+    bundle_bounds(rays, count, 0, low, high, near, far);
+    for (int a = 0; a < 3; a++) {
+        spread += high[a] - low[a];
+        apart += far[a] - near[a];
     }
     int alike = spread <= BUNDLE_DIRECTIONS && apart <= BUNDLE_ORIGINS * extent;
     for (int i = 0; i < count; i++) alike &= rays[i].active && rays[i].octant == rays->octant;
@@ -69,20 +78,13 @@ HOT void bundle_begin(global const Object *object, const Rays *rays, const Hits 
         bundle->order_shift = ray.order_shift;
         for (int a = 0; a < 3; a++) bundle->enter[a] = ray.enter[a];
     }
+    real near[3], far[3];
+    bundle_bounds(rays, count, 1, bundle->low_inverse, bundle->high_inverse, near, far);
     for (int a = 0; a < 3; a++) {
-        real low = rays->inverse[a], high = low, near = rays->origin[a], far = near;
-        for (int i = 1; i < count; i++) {
-            low = min_n(rays[i].inverse[a], low);
-            high = max_n(rays[i].inverse[a], high);
-            near = min_n(rays[i].origin[a], near);
-            far = max_n(rays[i].origin[a], far);
-        }
         const int negative = bundle->enter[a] & 1;
-        bundle->low_inverse[a] = low;
-        bundle->high_inverse[a] = high;
-        bundle->enter_origin[a] = negative ? near : far;
-        bundle->leave_origin[a] = negative ? far : near;
-        bundle->slack[a] = (R(16.0) * UNIT_ROUNDOFF) * reach * max_n(abs_n(low), abs_n(high));
+        bundle->enter_origin[a] = negative ? near[a] : far[a];
+        bundle->leave_origin[a] = negative ? far[a] : near[a];
+        bundle->slack[a] = (R(16.0) * UNIT_ROUNDOFF) * reach * max_n(abs_n(bundle->low_inverse[a]), abs_n(bundle->high_inverse[a]));
     }
 }
 
