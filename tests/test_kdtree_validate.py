@@ -87,6 +87,16 @@ def test_flat_triangle_may_be_on_either_side_but_not_on_none() -> None:
         without_entry(lower, 1).validate(vertices)
 
 
+@pytest.mark.parametrize("at", [0.0, 0.25])
+def test_triangle_that_is_a_point_of_the_plane_may_be_on_either_side_but_not_on_none(at: float) -> None:
+    vertices, lower = flat_in_the_middle()
+    vertices[2] = 0.0, at, at
+    assert lower.validate(vertices) == 0
+    assert replace(lower, **arrays([1, 0, 1], [0, 1, 2], [0, 1, 2])).validate(vertices) == 0
+    with pytest.raises(ValueError, match="triangle 2 reaches into leaf"):
+        without_entry(lower, 1).validate(vertices)
+
+
 def test_flat_triangle_may_not_be_split_between_both_sides_of_its_plane() -> None:
     vertices, tree = flat_in_the_middle()
     # Both sides of x = 0 are cut again at y = 0.5; triangle 2 is below it on one side, above it on the other: half of it twice.

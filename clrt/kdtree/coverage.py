@@ -2,8 +2,8 @@
 
 Independent of the builders: triangles are followed from the root with the separating-axis test of overlap.py, never by clipping.
 
-What "reaches" means. Let delta = 2^-40 * (the triangle's greatest |coordinate|): far above the rounding of float64, far below that of
-float32. A triangle that reaches farther than delta beyond a split, within the part of the cell where it was followed to, must be
+What "reaches" means. Let delta = 2^-40 * (the triangle's greatest |coordinate|), or the least number there is: far above the rounding of
+float64, far below that of float32. A triangle that reaches farther than delta beyond a split, within the part of the cell where it was followed to, must be
 found on that side. If it reaches farther than delta to neither side, as when it lies flat in the plane, it must be found on at least
 one of the two, whole. A triangle that only touches a side within delta may be there or not: a ray that hits it there passes
 within rounding of the plane, where traversal visits both sides. So the proof is an and-or tree over pairs of triangle and
@@ -55,7 +55,7 @@ class _Pairs:
 def check_coverage(tree: TreeArrays, vertices: F64) -> None:
     """Every triangle is in every leaf that it reaches."""
     n = len(vertices)
-    delta = DELTA * np.abs(vertices).max(axis=(1, 2), initial=0)
+    delta = np.maximum(DELTA * np.abs(vertices).max(axis=(1, 2), initial=0), np.finfo(np.float64).tiny)  # 0 for a point at the origin
     first = np.arange(n)
     depths = [_Pairs(first, np.zeros(n, np.int64), first, vertices.min(axis=1), vertices.max(axis=1), np.zeros(n, bool))] if n else []
     for _ in range(tree.depth if n else 0):
