@@ -50,17 +50,23 @@ def _target(path: str | PathLike[str]) -> str:
 @contextlib.contextmanager
 def _replacing(target: str, part: str) -> Iterator[None]:
     """Put the file `part` in the place of `target` when the block ends well; remove it in any case."""
-    _unfinished.add(part)
+    note_unfinished(part)
     try:
         yield
         if os.path.exists(target):
             shutil.copymode(target, part)
         os.replace(part, target)
     finally:
-        _discard(part)
+        discard(part)
 
 
-def _discard(part: str) -> None:
+def note_unfinished(part: str) -> None:
+    """From now on, until `discard`, this file goes with the process, however that ends but by a crash."""
+    _unfinished.add(part)
+
+
+def discard(part: str) -> None:
+    """Remove the file, if it is there."""
     with contextlib.suppress(OSError):
         os.unlink(part)
     _unfinished.discard(part)
@@ -76,17 +82,13 @@ def temporary_folder() -> str:
 
 
 @atexit.register
-def _discard_folders() -> None:
+def discard_unfinished() -> None:
+    """Remove what is being written, and temporary folders: for a process that is about to end without unwinding its stack."""
     for folder in tuple(_folders):
         shutil.rmtree(folder, ignore_errors=True)
         _folders.discard(folder)
-
-
-def discard_unfinished() -> None:
-    """Remove what is being written, and temporary folders: for a process that is about to end without unwinding its stack."""
     for part in tuple(_unfinished):
-        _discard(part)
-    _discard_folders()
+        discard(part)
 
 
 def check_writable(path: str | PathLike[str]) -> None:

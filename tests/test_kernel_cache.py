@@ -148,13 +148,14 @@ def test_unwritable_folder_of_the_variable_is_named(tmp_path: Path) -> None:
     assert len(done.stderr.splitlines()) == 1
 
 
-def test_empty_files_that_pocl_left_go_after_an_hour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_that_pocl_left_go_after_an_hour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
-    for name, size, age in (("tempfile_old001", 0, 4000), ("tempfile_new001", 0, 10), ("tempfile_full01", 5, 4000), ("notes", 0, 4000)):
+    old = (("tempfile_old001", 0), ("tempfile_full01", 5), ("tempfile_a1B2c3.so.o", 5), ("tempfile_a1B2c3.preproc.cl", 0), ("notes", 0))
+    for name, size, age in (*((name, size, 4000) for name, size in old), ("tempfile_new001", 0, 10), ("tempfile_d4E5f6.so", 5, 10)):
         (tmp_path / name).write_bytes(bytes(size))
         os.utime(tmp_path / name, (time.time() - age,) * 2)
     kernel_cache.choose_folder()
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["notes", "tempfile_full01", "tempfile_new001"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["notes", "tempfile_d4E5f6.so", "tempfile_full01", "tempfile_new001"]
 
 
 def test_mark_stays_while_any_thread_loads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -166,6 +167,22 @@ def test_mark_stays_while_any_thread_loads(tmp_path: Path, monkeypatch: pytest.M
         thread.join()
         assert mark.exists()
     assert not mark.exists()
+
+
+@pytest.mark.parametrize(
+    "end", ["interrupt.leave()", "threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start(); compile()", "sys.exit(130)"]
+)
+def test_mark_goes_with_a_process_that_ctrl_c_ends(tmp_path: Path, end: str) -> None:
+    """Whether the main thread ends the process while another one loads, or is itself in a call that no signal ends."""
+    program = "import hashlib, os, signal, sys, threading\nfrom clrt.cli import interrupt\nfrom clrt.device import kernel_cache\n"
+    program += "inside = threading.Event()\ndef compile():\n    with kernel_cache.loading():\n        inside.set()\n"
+    program += "        hashlib.pbkdf2_hmac('sha512', b'x', b'y', 60_000_000)\n"
+    program += "interrupt.watch()\nthreading.Thread(target=compile, daemon=True).start()\ninside.wait()\n"
+    program += f"print(len(os.listdir(os.environ['{kernel_cache.VARIABLE}'])), flush=True)\n{end}\n"
+    environment = os.environ | {kernel_cache.VARIABLE: str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout) == (130, "1\n")
+    assert not list(tmp_path.iterdir())
 
 
 def _load_nothing() -> None:

@@ -2,7 +2,8 @@
 
 PoCL trusts its cache: an entry that was cut off (a full disk, a machine that went down) crashes each later process that loads it,
 without a word. So a mark stands in the folder while a program is loaded and launched for the first time; a mark left by a
-process that is gone means that it died there, and the folder is emptied before anything is loaded again.
+process that is gone means that it died there, and the folder is emptied before anything is loaded again. A process that Ctrl-C
+ends takes its mark along: PoCL renames whole files, so what it was compiling is missing, not broken.
 """
 
 from __future__ import annotations
@@ -18,15 +19,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from clrt.files import temporary_folder
+from clrt.files import discard, note_unfinished, temporary_folder
 
 VARIABLE = "POCL_CACHE_DIR"
 _lock = threading.Lock()
 _loading = 0  #: threads that are in `loading`
-_LEFT_S = 3600.0  #: seconds after which an empty file is left over
+_LEFT_S = 3600.0  #: seconds after which a temporary file of PoCL's is left over
 _ROOM = 16 << 20  #: bytes that a few programs and their kernels take; libraries raise errors of their own where a disk is full
 _MARK = "clrt-loading-"
 _COMPILED = "clrt-compiled-"
+_PART = re.compile(r"tempfile_\w{6}\.(cl|preproc\.cl|so|so\.o)")  #: what PoCL's compiler is at work on
 #: entries of PoCL, and notes of them; POCL_CACHE_DIR may name a folder with files of the user's
 _POCLS = re.compile(rf"[A-P]{{2}}|tempfile_\w+|{_COMPILED}\w+")
 
@@ -51,13 +53,14 @@ def choose_folder() -> Path:
 
 
 def _sweep(folder: Path) -> None:
-    """Removes the empty files that PoCL leaves behind, one a process; those of the last hour may be in use."""
+    """Removes what PoCL leaves behind: an empty file a process, more at Ctrl-C; those of the last hour may be in use."""
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
             if entry.name.startswith("tempfile_"):
                 with suppress(OSError):
                     found = entry.stat(follow_symlinks=False)
-                    if stat.S_ISREG(found.st_mode) and not found.st_size and found.st_mtime < time.time() - _LEFT_S:
+                    left = not found.st_size or _PART.fullmatch(entry.name)
+                    if left and stat.S_ISREG(found.st_mode) and found.st_mtime < time.time() - _LEFT_S:
                         os.unlink(entry.path)
 
 
@@ -165,6 +168,7 @@ def loading() -> Iterator[None]:
             clear_if_one_died()
         _loading += 1
         mark = Path(os.environ.get(VARIABLE, tempfile.gettempdir())) / f"{_MARK}{os.getpid()}"
+        note_unfinished(str(mark))
         with suppress(OSError):
             mark.touch()
     try:
@@ -173,5 +177,4 @@ def loading() -> Iterator[None]:
         with _lock:
             _loading -= 1
             if not _loading:
-                with suppress(OSError):
-                    mark.unlink(missing_ok=True)
+                discard(str(mark))
