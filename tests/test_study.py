@@ -194,6 +194,7 @@ def test_interrupted_study_keeps_its_parts_and_goes_on(faked: tuple[Path, list[s
     _interrupt_at(monkeypatch, "effects")
     result = clrt("study", path, "-o", out, "--quick", "--quiet")
     assert result.exit_code == 130
+    assert result.stderr.strip() == f"clrt: interrupted; what is measured is kept in {out}, and --resume goes on with it"
     kept = store.read(out)
     assert {part for part in ROWS if kept[part] is not None} == {"samples", "bias", "precision", "depth"}
     assert kept["verdict"] is None
@@ -202,6 +203,13 @@ def test_interrupted_study_keeps_its_parts_and_goes_on(faked: tuple[Path, list[s
     assert clrt("study", path, "-o", out, "--quick", "--resume", "--quiet").exit_code == 0
     assert log == ["effects", "trees", "phases"]
     assert faults(json.loads((out / "study.json").read_text())) == []
+
+
+def test_interrupted_study_that_kept_nothing_cannot_be_resumed(faked: tuple[Path, list[str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    path, _ = faked
+    _interrupt_at(monkeypatch, "samples")
+    result = clrt("study", path, "-o", path.parent / "out", "--quick", "--quiet")
+    assert (result.exit_code, result.stderr.strip()) == (130, "clrt: interrupted")
 
 
 @pytest.mark.parametrize(

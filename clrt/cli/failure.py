@@ -19,8 +19,7 @@ from contextlib import contextmanager
 
 import click
 
-from clrt.cli import streams
-from clrt.cli.interrupt import EXIT_CODE as INTERRUPTED
+from clrt.cli import interrupt, streams
 from clrt.errors import ClrtError, SceneError
 
 FAULT = 1
@@ -32,8 +31,8 @@ def report(error: BaseException) -> int:
     """Print `error` and return the exit code."""
     # click turns KeyboardInterrupt into Abort, and EOFError, too, which would be a fault.
     if isinstance(error, KeyboardInterrupt | click.Abort) and not isinstance(error.__cause__, EOFError):
-        streams.complain("clrt: interrupted\n")
-        return INTERRUPTED
+        streams.complain(interrupt.message())
+        return interrupt.EXIT_CODE
     message = _message(error)
     if message is None or os.environ.get("CLRT_DEBUG") == "1":
         streams.complain("".join(traceback.format_exception(error)))

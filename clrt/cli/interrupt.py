@@ -12,6 +12,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Callable
 from typing import NoReturn
 
 from clrt.cli import streams
@@ -21,6 +22,19 @@ EXIT_CODE = 130  #: 128 + SIGINT, what a shell reports for an interrupted progra
 
 _GRACE_S = 0.6  #: for the orderly way; with the time to notice well under a second
 _SHOW_CURSOR = "\x1b[?25h"  # ANSI; the progress display hides it
+_advice: Callable[[], str] = str  #: what more to say, asked at that time
+
+
+def advise(advice: Callable[[], str]) -> None:
+    """What `message` is to end with; "" for nothing."""
+    global _advice
+    _advice = advice
+
+
+def message() -> str:
+    """The one line that is said of Ctrl-C."""
+    advice = _advice()
+    return f"clrt: interrupted{'; ' if advice else ''}{advice}\n"
 
 
 def watch() -> None:
@@ -52,6 +66,6 @@ def _wait(read_end: int) -> None:
     time.sleep(_GRACE_S)
     discard_unfinished()
     try:
-        os.write(2, f"{_SHOW_CURSOR if streams.is_terminal(sys.stderr) else ''}clrt: interrupted\n".encode())
+        os.write(2, f"{_SHOW_CURSOR if streams.is_terminal(sys.stderr) else ''}{message()}".encode())
     finally:
         os._exit(EXIT_CODE)

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from clrt import __version__
-from clrt.cli import failure, streams
+from clrt.cli import failure, interrupt, streams
 from clrt.cli.paths import DEFAULT_SCENE
 
 #: a command and the module that has it, in the order of the help; imported when called for, so that `clrt --help` is quick
@@ -80,6 +80,7 @@ class _RenderByDefault(click.Group):
         name = prog_name or "clrt"
         if not standalone_mode:
             return super().main(args, name, complete_var, standalone_mode=False, **extra)
+        interrupt.advise(str)
         try:
             result = super().main(args, name, complete_var, standalone_mode=False, **extra)
         except (Exception, KeyboardInterrupt) as error:
@@ -105,7 +106,7 @@ def main() -> None:
     import atexit
     import os
 
-    from clrt.cli import clock, interrupt
+    from clrt.cli import clock
 
     streams.hold_descriptors()
     clock.begin()

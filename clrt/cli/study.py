@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from clrt.cli import arguments as kinds
-from clrt.cli import failure, paths, streams
+from clrt.cli import failure, interrupt, paths, streams
 from clrt.cli.progress import PhaseProgress
 from clrt.files import atomic_write, check_writable
 
@@ -78,8 +78,10 @@ def _measure(
     from clrt.scene.build import load_scene
     from clrt.study.plan import FULL, QUICK
     from clrt.study.run import check_folder, run_study
+    from clrt.study.store import FILE
 
     check_folder(out)
+    interrupt.advise(lambda: f"what is measured is kept in {out}, and --resume goes on with it" if (out / FILE).exists() else "")
     plan = QUICK if quick else FULL
     plan = plan if seeds is None else replace(plan, seeds=seeds)
     read = partial(load_scene, path, right_handed=right_handed, split_objects=split_objects, allow_paths=allow_path)
