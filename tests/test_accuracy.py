@@ -13,6 +13,7 @@ from accuracy_scenes import HEIGHT, Renders, lambert_truth, lamp_over_floor, rar
 import clrt
 from clrt.adaptive import engine as engines
 from clrt.adaptive.engine import PILOT_SAMPLES, Goal
+from clrt.adaptive.moments import moments
 from clrt.adaptive.replicates import HALVES, MAP_REPLICATES
 from clrt.adaptive.request import Request
 from clrt.device.context import Device
@@ -74,6 +75,18 @@ def test_replicates_are_the_scene_at_their_own_seeds(shadow: Renders) -> None:
     engine.run()
     plain = clrt.render(shadow.scene, samples=4, seed=replicate_seeds(9, MAP_REPLICATES)[5]).pixels
     assert (engine.replicates.means(5, 4).astype(np.float32) == plain).all()
+
+
+def test_means_of_the_last_look_are_kept_for_two_replicates_alone(shadow: Renders) -> None:
+    """12 bytes a pixel and replicate: more than two tell the noise of colours by themselves, whatever was before."""
+    engine = shadow.engine(9, Goal(samples=16), 2)
+    assert engine.before is not None
+    assert engine.before.nbytes == 2 * 12 * engine.grid.inside.size
+    assert shadow.engine(9, Goal(samples=16), MAP_REPLICATES).before is None
+    rng, sides = np.random.default_rng(1), engine.grid.sides
+    values, before = rng.normal(size=(2, MAP_REPLICATES, 5, 8, 16, 3))
+    alone, told = (moments(values, np.ones((5, 8, 16), bool), sides, b) for b in (None, before.astype(np.float32)))
+    assert (alone.square == told.square).all()
 
 
 def test_uniform_sampling_is_untouched_by_the_request_for_its_error() -> None:

@@ -72,7 +72,8 @@ class Engine:
         self.start = time.perf_counter()
         self.cost: FloatArray = np.zeros(self.grid.count)  #: seconds of one sample of a tile, all replicates, as the pilot took
         self.ledger = Ledger(self.grid, replicates.count, PILOT_SAMPLES if goal.samples is None else goal.samples // replicates.count)
-        self.before = np.zeros((replicates.count, *self.grid.inside.shape, 3), np.float32)  #: means of the last look
+        #: means of the last look, which `moments` asks of two replicates alone
+        self.before = np.zeros((2, *self.grid.inside.shape, 3), np.float32) if replicates.count == 2 else None
         self.forecast: Forecast | None = None
         self.next_look = 0.0  #: seconds spent, when it is worth while to look ahead again
         self.overhead = replicates.overhead()  #: seconds of a launch that traces nothing
@@ -146,10 +147,11 @@ class Engine:
     def _look(self, tiles: IntArray, level: int) -> None:
         """Puts what the sums of these tiles say into the ledger."""
         values = self.replicates.values(tiles, int(self.ledger.samples(level)))
-        before = self.before[:, tiles] if level > 0 else None
+        before = None if self.before is None or level == 0 else self.before[:, tiles]
         self.ledger.put(tiles, level, moments(values, self.grid.inside[tiles], self.grid.sides, before))
-        with np.errstate(invalid="ignore", over="ignore"):  # beside the picture there may be anything
-            self.before[:, tiles] = values
+        if self.before is not None:
+            with np.errstate(invalid="ignore", over="ignore"):  # beside the picture there may be anything
+                self.before[:, tiles] = values
 
     def _extend(self, tiles: IntArray) -> bool:
         """The next level of these tiles; False where there is no time for all."""
