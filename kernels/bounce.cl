@@ -82,8 +82,10 @@ HOT void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
 //@end
 //@hook trace
         // The eye's rays share their origin; those that go on do not.
-        if (current.from_eye) scene_trace(&geometry, &rays, 1, 0, &hits);
-        else scene_trace(&geometry, &rays, 0, 0, &hits);
+        if (current.from_eye) {
+            //@ eye_trace
+        } else
+            scene_trace(&geometry, &rays, 0, 0, &hits);
 //@end
 //@hook spawn
         if (current.depth_left > 0) {

@@ -33,6 +33,10 @@ static inline void count_rays(volatile global uint *counters, int kind, mask_n l
 //@hook count_tests
             hits->tests += count_lanes(live) * (end - first);
 //@end
+//@hook count_met
+        count_add(geometry->counters, COUNT_TESTS + geometry->surfaces[boxes->item[0]].object,
+                  (uint)(count_lanes(group->active[p]) * popcount(met)));
+//@end
 //@hook count_object
         if (hits->tests > 0) count_add(geometry->counters, COUNT_TESTS + b, (uint)hits->tests);
         hits->tests = 0;

@@ -1,5 +1,6 @@
 // Provides: Geometry, what a ray can meet, by pointer.
 // Needs: structs.  Reads: nothing.
+//@ geometry_types
 typedef struct {
     // Inner nodes: (bits of the split, lower child << 4 | 8 where the upper one is an empty leaf | 4 where the lower one is | axis);
     // leaves: (first index, count << 2 | 3).

@@ -126,6 +126,26 @@ HOT int count_lanes(mask_n m) {
     return n;
 }
 
+// The least number of all lanes, none of them NaN.
+HOT real least_lane(real_n v) {
+#if LANES == 1
+    return v;
+#else
+#if LANES == 16
+    const PASTE(REAL_NAME, 8) a = v.lo < v.hi ? v.lo : v.hi;
+#elif LANES == 8
+    const PASTE(REAL_NAME, 8) a = v;
+#endif
+#if LANES >= 8
+    const PASTE(REAL_NAME, 4) b = a.lo < a.hi ? a.lo : a.hi;
+#else
+    const PASTE(REAL_NAME, 4) b = v;
+#endif
+    const PASTE(REAL_NAME, 2) c = b.lo < b.hi ? b.lo : b.hi;
+    return c.x < c.y ? c.x : c.y;
+#endif
+}
+
 // Dot products may contract: |error| <= 3u |a||b| fused, 5u |a||b| unfused (Higham 2002, section 3.1); bounds elsewhere assume the larger.
 HOT real_n dot_n(const real_n *a, const real_n *b) {
 #pragma OPENCL FP_CONTRACT ON

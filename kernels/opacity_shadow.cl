@@ -43,7 +43,7 @@ static __attribute__((noinline)) void opacity_through(const Geometry *geometry, 
     real_n let_through = (real_n)1;
     geometry.let_through = &let_through;
 //@end
-//@hook shadow_limit
+//@hook shadow_open
     const Hits open = hits;
 //@end
 //@hook shadow_blocked

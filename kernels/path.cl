@@ -31,7 +31,7 @@ HOT void path_pair(const Draws *draws, const uint path, const uint use, real_n *
     *second = load_lanes(v);
 }
 
-//@hook camera
+//@hook drawn
     const Draws draws = {((uint)row << 16) | (uint)column, sample, seed};
     uint path = 1;
 //@end

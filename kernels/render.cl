@@ -1,14 +1,10 @@
-// Provides: kernel render: one packet of pixels a work-item, from the camera's rays to linear colour.
-// Needs: camera.cl, scene.cl, hit.cl and what the effects add.  Reads: PACKET_WIDTH, PACKET_HEIGHT.
+// Provides: kernel render: one packet of pixels a work-item, or a group of packets (group.cl), from the camera's rays to linear colour.
+// Needs: camera.cl, scene.cl, hit.cl and what the effects add.  Reads: PACKET_WIDTH, PACKET_HEIGHT, ITEM_WIDTH, ITEM_HEIGHT (pixels of a work-item).
 
-// One packet, apart from the kernel: PoCL makes three copies of a kernel's body, and one of this.
-static __attribute__((noinline)) void
-render_packet(const int column, const int row, global const Frame *frame, global const int2 *nodes, global const int *indices,
-                   global const Triangle *triangles, global const EdgePlanes *eye_planes, global const double *vertices, global const Object *objects,
-                   global const Surface *surfaces, global const Material *materials, int end_row, global float *film
-                   //@ parameters
-                   //@ packet_parameters
-) {
+// What rays from the eye can meet; effects add their own members at `begin`.
+HOT Geometry scene_geometry(global const Frame *frame, global const int2 *nodes, global const int *indices, global const Triangle *triangles,
+                            global const EdgePlanes *eye_planes, global const double *vertices, global const Object *objects,
+                            global const Surface *surfaces) {
     Geometry geometry;
     geometry.nodes = nodes;
     geometry.indices = indices;
@@ -23,9 +19,23 @@ render_packet(const int column, const int row, global const Frame *frame, global
         geometry.shared_origin[a] = frame->eye[a];
         geometry.local_origin[a] = frame->local_origin[a];
     }
+    return geometry;
+}
+
+// One packet, apart from the kernel: PoCL makes three copies of a kernel's body, and one of this.
+static __attribute__((noinline)) void
+render_packet(const int column, const int row, global const Frame *frame, global const int2 *nodes, global const int *indices,
+                   global const Triangle *triangles, global const EdgePlanes *eye_planes, global const double *vertices, global const Object *objects,
+                   global const Surface *surfaces, global const Material *materials, int end_row, global float *film
+                   //@ parameters
+                   //@ packet_parameters
+                   //@ group_parameters
+) {
+    Geometry geometry = scene_geometry(frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces);
     //@ begin
     Rays rays;
-    //@ camera
+    //@ eye_rays
+    //@ drawn
     real_n color[3] = {(real_n)0, (real_n)0, (real_n)0}, weight = (real_n)1;
     //@ primary
     for (;;) {
@@ -35,7 +45,7 @@ render_packet(const int column, const int row, global const Frame *frame, global
         //@ hits_begin
         //@ trace
         Hit hit;
-        hit_surface(&geometry, frame, surfaces, &rays, &hits, &hit);
+        //@ surface
         //@ arrived
         // The light that leaves the hit points towards the viewer, without what other rays bring.
         Shade shade;
@@ -67,6 +77,7 @@ render_packet(const int column, const int row, global const Frame *frame, global
     //@ end
 }
 
+//@ group
 #define STRIP 16
 
 // The hint keeps a compiler's own vectoriser (Intel's) off lanes that are vectors already: it would take seconds, for slower code.
@@ -80,13 +91,10 @@ void render(global const Frame *frame, global const int2 *nodes, global const in
     const int across = get_num_groups(0), group = get_group_id(1) * across + get_group_id(0), strip = group / (across * STRIP);
     const int high = min(STRIP, (int)get_num_groups(1) - strip * STRIP), place = group - strip * across * STRIP;
     const int group_x = place / high, group_y = strip * STRIP + place % high;
-    int column = (group_x * get_local_size(0) + get_local_id(0)) * PACKET_WIDTH;
-    int row = first_row + (group_y * get_local_size(1) + get_local_id(1)) * PACKET_HEIGHT;
+    int column = (group_x * get_local_size(0) + get_local_id(0)) * ITEM_WIDTH;
+    int row = first_row + (group_y * get_local_size(1) + get_local_id(1)) * ITEM_HEIGHT;
     //@ packet
     if (column >= frame->width || row >= end_row) return;
     //@ repeat
-    render_packet(column, row, frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces, materials, end_row, film
-                  //@ arguments
-                  //@ packet_arguments
-    );
+    //@ launch
 }

@@ -1,5 +1,5 @@
 // Provides: sampling_camera, sampling_store: one sample of each pixel, and the mean of those so far.
-// Needs: sampler.cl, lanes.cl, rays.cl, structs.  Reads: PACKET_WIDTH, PACKET_HEIGHT (their product is LANES), TILE_WIDTH, TILE_HEIGHT.
+// Needs: sampler.cl, lanes.cl, rays.cl, structs.  Reads: PACKET_WIDTH, PACKET_HEIGHT (their product is LANES), ITEM_WIDTH, ITEM_HEIGHT, TILE_WIDTH, TILE_HEIGHT.
 //
 // `sample_range` holds the first sample and the one behind the last, all of which a launch adds up pixel by pixel, then the number of tiles;
 // none: rows as they are launched. Of each tile four words follow: column and row of its first pixel, which are multiples of a tile's width
@@ -45,12 +45,12 @@ static inline double sampling_add(uint sample, global double *sum, real value) {
     uint seed = (uint)frame->seed;
     size_t tile_at = 0;
     if (sample_range[2] > 0) {
-        const int across = TILE_WIDTH / PACKET_WIDTH, packets = across * (TILE_HEIGHT / PACKET_HEIGHT);
-        const int number = get_global_id(1) * get_global_size(0) + get_global_id(0), tile = number / packets, place = number % packets;
+        const int across = TILE_WIDTH / ITEM_WIDTH, items = across * (TILE_HEIGHT / ITEM_HEIGHT);
+        const int number = get_global_id(1) * get_global_size(0) + get_global_id(0), tile = number / items, place = number % items;
         if (tile >= sample_range[2]) return;
         global const int *given = sample_range + 3 + 4 * tile;
-        column = given[0] + place % across * PACKET_WIDTH;
-        row = given[1] + place / across * PACKET_HEIGHT;
+        column = given[0] + place % across * ITEM_WIDTH;
+        row = given[1] + place / across * ITEM_HEIGHT;
         seed = (uint)given[2];
         tile_at = (size_t)given[3] * (TILE_WIDTH * TILE_HEIGHT);
     }

@@ -1,5 +1,11 @@
 // Provides: scene_trace: rays through every object of the scene, one tree after the other.
 // Needs: kdtree.cl, geometry.cl.  Reads: nothing.
+
+// Rays through what no tree holds, after the trees.
+HOT void scene_rest(const Geometry *geometry, const Rays *rays, mask_n active, const int shared_origin, const int any_hit, Hits *hits) {
+    //@ scene_trace
+}
+
 HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int shared_origin, const int any_hit, Hits *hits) {
     mask_n active = rays->active;
     for (int b = 0; b < geometry->object_count; b++) {
@@ -10,5 +16,5 @@ HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int share
             if (!any_lane(active)) return;
         }
     }
-    //@ scene_trace
+    scene_rest(geometry, rays, active, shared_origin, any_hit, hits);
 }

@@ -1,15 +1,21 @@
-// Provides: shadow_lit: which hit points a point light sees.
+// Provides: light_geometry, shadow_rays, shadow_lit: which hit points a point light sees.
 // Needs: scene.cl, hit.cl, structs.  Reads: SHADOW_SHARED_ORIGIN (1: edge planes as seen from every light are at hand).
+
+// What rays from a light meet: everything, as seen from there.
+HOT Geometry light_geometry(const Geometry *geometry, global const Light *light, int index) {
+    Geometry seen = *geometry;
+    seen.planes = geometry->light_planes + (size_t)index * geometry->slot_count;
+    for (int a = 0; a < 3; a++) seen.shared_origin[a] = light->given[a];
+    //@ light_geometry
+    return seen;
+}
 
 // Traced from the light, whose rays share it as their origin, to the point: it ends off the surface by the point's error and the
 // ray's own (4u of its length and of the light's position), starts as far from the light, and passes by the primitive it ends on.
-HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int index, const Hit *hit, mask_n lit) {
-    Geometry seen = *geometry;
-    seen.planes = geometry->light_planes + (size_t)index * geometry->slot_count;
+HOT void shadow_rays(const Geometry *geometry, global const Light *light, const Hit *hit, mask_n lit, Rays *to_hits, Hits *none) {
     Rays rays;
     real_n end[3], span[3], offset = 0;
     for (int a = 0; a < 3; a++) {
-        seen.shared_origin[a] = light->given[a];
         end[a] = hit->point[a];
         //@ shadow_end
         span[a] = end[a] - light->position[a];
@@ -35,6 +41,16 @@ HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int i
     hits.slot = (mask_n)-1;
     //@ hits_begin
     //@ shadow_limit
+    *to_hits = rays;
+    *none = hits;
+}
+
+HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int index, const Hit *hit, mask_n lit) {
+    const Geometry seen = light_geometry(geometry, light, index);
+    Rays rays;
+    Hits hits;
+    shadow_rays(geometry, light, hit, lit, &rays, &hits);
+    //@ shadow_open
     scene_trace(&seen, &rays, SHADOW_SHARED_ORIGIN, 1, &hits);
     //@counting count_rays(geometry->counters, COUNT_SHADOW, rays.active);
     //@ shadow_blocked
@@ -48,5 +64,8 @@ HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int i
     geometry.light_planes = light_planes;
 //@end
 //@hook visible
-        lit = shadow_lit(geometry, light, i, hit, lit);
+        mask_n clear = NO_LANES;
+        //@ visible_known
+        if (any_lane(lit)) lit = shadow_lit(geometry, light, i, hit, lit);
+        lit |= clear;
 //@end

@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
-_C_NAMES = {np.dtype(np.int32): "int", np.dtype(np.int64): "long", np.dtype(np.float64): "double", np.dtype(np.float32): "float"}
+_C_NAMES = {np.dtype(np.int16): "short", np.dtype(np.int32): "int", np.dtype(np.int64): "long", np.dtype(np.float64): "double", np.dtype(np.float32): "float"}
+
+BOXES = 16  #: entries of leaves whose boxes are compared at once
 
 Field = tuple[str, Any] | tuple[str, Any, int | tuple[int, ...]]
 
@@ -39,6 +41,14 @@ def edge_planes(real: type) -> np.dtype[np.void]:
     vector: Any = (real, (3,))
     return struct_dtype([("u", *vector), ("v", *vector), ("w", *vector), ("normal", *vector), ("offset", real), ("bound", real),
                          ("normal_bound", real), ("offset_bound", real)])  # fmt: skip
+
+
+def direction_boxes() -> np.dtype[np.void]:
+    """Bounds of the directions in which BOXES triangles, or records of such, lie from a shared origin, in steps (directions.cl); how near
+    they are; slots, or numbers of records. 320 bytes.
+    """
+    return struct_dtype([("lo", np.int16, (3, BOXES)), ("hi", np.int16, (3, BOXES)), ("near", np.float32, (BOXES,)),
+                         ("item", np.int32, (BOXES,))])  # fmt: skip
 
 
 def object_record(real: type) -> np.dtype[np.void]:

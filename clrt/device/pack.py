@@ -19,6 +19,7 @@ from clrt.device.rounding import rounded_down, rounded_up
 from clrt.errors import LimitError
 from clrt.features import Features
 from clrt.kdtree.arrays import LEAF
+from clrt.kdtree.runs import leaf_runs
 from clrt.kdtree.tree import KdTree
 from clrt.precision import Precision
 from clrt.scene.model import MeshObject, Scene
@@ -50,18 +51,6 @@ def tree_origins(scene: Scene) -> FloatArray:
     return object_origins(scene, local_origin(scene))
 
 
-def leaf_order(tree: KdTree, triangles: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The triangles that leaves name, in the order of their first naming: (order, slot of each triangle or -1)."""
-    entries = len(tree.indices)
-    places = np.arange(entries)
-    first = np.empty(triangles, np.int64)
-    first[tree.indices[::-1]] = places[::-1]  # of equal indices the last write stays: the first naming
-    order = tree.indices[first[tree.indices] == places].astype(np.int64)
-    slots = np.full(triangles, -1, np.int64)
-    slots[order] = np.arange(len(order))
-    return order, slots
-
-
 def nodes_of(tree: KdTree, first_node: int, first_index: int) -> NDArray[np.int32]:
     """(m, 2) int32 node words, as geometry.cl has them. Raises LimitError where a child's number has no room."""
     if first_node + len(tree.split_axis) > MOST_NODES:
@@ -91,15 +80,18 @@ def unit_normals(vertices: FloatArray) -> FloatArray:
 def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: Precision) -> Packed:
     """All arrays of a scene. `trees[i]` is the tree of `scene.objects[i]`, over vertices less its row of `tree_origins(scene)`."""
     real, origin = precision.real, local_origin(scene)
-    nodes, indices, orders = [], [], []
+    nodes, indices, orders, blocks = [], [], [], []
     objects = np.zeros(len(trees), layout.object_record(real))
     node = index = slot = 0
     for number, (item, tree) in enumerate(zip(scene.objects, trees, strict=True)):
-        order, slots = leaf_order(tree, len(item))
+        order, parts = leaf_runs(tree, len(item), layout.BOXES)
+        slots = np.full(len(item), -1, np.int64)
+        slots[order] = np.arange(len(order))
         objects[number] = _object_record(item, tree, node, real)
         nodes.append(nodes_of(tree, node, index))
         indices.append((slots[tree.indices] + slot).astype(np.int32))
         orders.append(order)
+        blocks.append(parts + [slot, 0])
         node, index, slot = node + len(tree.split_axis), index + len(tree.indices), slot + len(order)
     given = [np.take(item.vertices, order, 0) for item, order in zip(scene.objects, orders, strict=True)]
     vertices = np.concatenate(given) if given else np.zeros((0, 3, 3))
@@ -108,6 +100,7 @@ def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: P
         origin=origin,
         nodes=np.concatenate(nodes) if nodes else np.zeros((0, 2), np.int32),
         indices=np.concatenate(indices) if indices else np.zeros(0, np.int32),
+        blocks=np.concatenate(blocks).astype(np.int32) if blocks else np.zeros((0, 2), np.int32),
         vertices=vertices,
         objects=objects,
         surfaces=_surfaces(scene, orders, vertices, real),

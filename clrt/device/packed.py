@@ -17,7 +17,7 @@ FloatArray = NDArray[np.float64]
 class Packed:
     """What every program reads; the arrays of effects come from `argument`.
 
-    nodes (m, 2) int32; indices (r,) int32 slots; vertices (s, 3, 3) float64 as given; objects, surfaces, materials, frame: structs
+    nodes (m, 2) int32; indices (r,) int32 slots; blocks (b, 2) int32 first slot and count; vertices (s, 3, 3) float64 as given; objects, surfaces, materials, frame: structs
     prim_ids : (s,) int64 primitive id of each slot
     origins : (objects, 3) float64, what the coordinates of each object are relative to: `origin`, but for hidden ones
     """
@@ -26,6 +26,7 @@ class Packed:
     origin: FloatArray
     nodes: NDArray[np.int32]
     indices: NDArray[np.int32]
+    blocks: NDArray[np.int32]
     vertices: FloatArray
     objects: NDArray[np.void]
     surfaces: NDArray[np.void]

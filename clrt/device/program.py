@@ -39,14 +39,23 @@ _ENTRIES = {
 }
 PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a packet, width and height
 TILE = (16, 8)  #: pixels of a tile, width and height: whole packets of any size
+GROUP = (4, 2)  #: packets of a work-item that go together, across and down
+GROUP_STACK = 15 * 7 + 1  #: entries: for 7 levels of records, more than 2^27 blocks have
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
 RUN = 32  #: rays of a work-item in arrays of rays
 SORT_BITS = 3  #: an axis, of the grid of origins by which rays are sorted; measured: more bits save nothing
 MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
 #: what stands at a place where no effect adds anything
-_DEFAULTS = {"trace": "        scene_trace(&geometry, &rays, 1, 0, &hits);", "next": "        break;",
-             "camera": "    camera_rays(frame, column, row, &rays);",
+_DEFAULTS = {"trace": "        //@ eye_trace", "eye_trace": "        scene_trace(&geometry, &rays, 1, 0, &hits);", "next": "        break;",
+             "tie": "    closer |= is_equal(t, hits->t) & is_less((mask_n)slot, hits->slot);",
+             "eye_rays": "    //@ camera", "camera": "    camera_rays(frame, column, row, &rays);",
+             "surface": "        hit_surface(&geometry, frame, surfaces, &rays, &hits, &hit);",
+             "launch": """\
+    render_packet(column, row, frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces, materials, end_row, film
+                  //@ arguments
+                  //@ packet_arguments
+    );""",
              "store": "        for (int a = 0; a < 3; a++) film[3 * ((size_t)y * frame->width + x) + a] = (float)out[a][k];"}  # fmt: skip
 _PLACE = re.compile(r"^[ \t]*//@ (\w+)[ \t]*$", re.M)
 _HOOK = re.compile(r"^//@hook (\w+)\n(.*?)^//@end[ \t]*\n?", re.M | re.S)
@@ -82,6 +91,24 @@ def stack_size(tree_depth: int) -> int:
     return max(8, -(-(tree_depth + 1) // 8) * 8)
 
 
+def grouped(features: Features, lanes: int) -> bool:
+    """Whether packets of pixels go together (group.cl): where their rays share the eye, and objects are few enough to be met in turn."""
+    alone = {"object tree", "wide eye", "sampling"}
+    return lanes > 1 and not features.every and alone.isdisjoint(f.name for f in features.active)
+
+
+def lights_grouped(features: Features, lanes: int, shared_lights: bool) -> bool:
+    """Whether shadow rays of what the eye sees do, too (group_shadow.cl): where they depend on the hit alone."""
+    names = {f.name for f in features.active}
+    return grouped(features, lanes) and shared_lights and "shadows" in names and names.isdisjoint(("opacity shadows", "spot", "fog"))
+
+
+def item_size(features: Features, lanes: int) -> tuple[int, int]:
+    """Pixels of a work-item of `render`: width and height."""
+    width, height = PACKETS[lanes]
+    return (width * GROUP[0], height * GROUP[1]) if grouped(features, lanes) else (width, height)
+
+
 @cache
 def kernel_folder() -> Any:
     """Where the kernel files are: inside the installed package, or at the top of a checkout."""
@@ -97,7 +124,7 @@ def kernel_source(name: str) -> tuple[str, tuple[tuple[str, str, int], ...]]:
     return _HOOK.sub("", text).rstrip("\n") + "\n", hooks
 
 
-def _structs(features: Features, precision: Precision, entry: str, block: int) -> str:
+def _structs(features: Features, precision: Precision, lanes: int, entry: str, block: int) -> str:
     real = precision.real
     names = [
         ("Triangle", layout.triangle(real)), ("EdgePlanes", layout.edge_planes(real)), ("Object", layout.object_record(real)),
@@ -109,6 +136,8 @@ def _structs(features: Features, precision: Precision, entry: str, block: int) -
         ("Emitter", layout.emitter), ("Placement", layout.placement), ("EnvironmentRow", layout.environment_row),
     )  # fmt: skip
     names += [(name, make(real)) for name, make in optional if f" {name} " in declared]
+    if entry == "render" and grouped(features, lanes):
+        names.append(("DirectionBoxes", layout.direction_boxes()))
     if entry == "cast":
         names += [("WideNode", layout.wide_node(real, block)), ("Block", layout.block(real, block))]
         names += [("GivenRay", layout.GIVEN_RAY), ("HitSource", layout.HIT_SOURCE), ("HitRecord", layout.HIT_RECORD)]
@@ -137,6 +166,9 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     if shape.block:
         values |= {"BLOCK": shape.block, "SORT_BITS": SORT_BITS, "RUN": RUN}
     names = {f.name for f in features.active}
+    values |= dict(zip(("ITEM_WIDTH", "ITEM_HEIGHT"), item_size(features, lanes), strict=True))
+    if grouped(features, lanes):
+        values |= {"GROUP": GROUP[0] * GROUP[1], "GROUP_WIDTH": GROUP[0], "BOXES": layout.BOXES, "GROUP_STACK": GROUP_STACK}
     if "sampling" in names:
         values |= {"TILE_WIDTH": TILE[0], "TILE_HEIGHT": TILE[1]}
     if "shadows" in names:
@@ -166,20 +198,25 @@ def _insert(name: str, text: str, hooks: dict[str, list[tuple[str, str, int]]]) 
         for file, code, first in found:
             out += [f'#line {first} "{file}"', _insert(file, code, hooks).rstrip("\n")]
         if not found and place[1] in _DEFAULTS:
-            out.append(_DEFAULTS[place[1]])
-        if found or place[1] not in _DEFAULTS:
-            out.append(f'#line {number + 1} "{name}"')
+            out.append(_insert(name, _DEFAULTS[place[1]], hooks).rstrip("\n"))
+        out.append(f'#line {number + 1} "{name}"')
     return "\n".join(out) + "\n"
 
 
-def _files(features: Features, precision: Precision, entry: str) -> Iterator[str]:
+def _files(features: Features, precision: Precision, lanes: int, shape: Shape, entry: str) -> Iterator[str]:
     before, between, after = _ENTRIES[entry]
+    together = entry == "render" and grouped(features, lanes)
     instead = {f.replaces: f.kernel for f in features.active if f.replaces}
-    yield from (*_RAYS, *precision.kernels, *_TREES, *before)
+    yield from (*_RAYS, *precision.kernels, *_TREES)
+    yield from ("directions.cl",) if together else ()
+    yield from before
     yield from precision.surface_kernels if "hit.cl" in before else ()
     yield from (f.kernel for f in features.active if f.early and not f.replaces)
     yield from (instead.get(name, name) for name in between)
+    yield from ("frustum.cl",) if together else ()
     yield from (f.kernel for f in features.active if not f.early)
+    yield from ("group.cl",) if together else ()
+    yield from ("group_shadow.cl",) if entry == "render" and lights_grouped(features, lanes, shape.shared_lights) else ()
     yield from after
 
 
@@ -188,7 +225,7 @@ def compose(features: Features, precision: Precision, lanes: int, shape: Shape, 
 
     entry : "render" for pictures, "cast" for arrays of rays
     """
-    files = list(_files(features, precision, entry))
+    files = list(_files(features, precision, lanes, shape, entry))
     if counting:
         files.insert(0, "count.cl")
     if features.every:
@@ -201,7 +238,7 @@ def compose(features: Features, precision: Precision, lanes: int, shape: Shape, 
         for place, code, line in kernel_source(name)[1]:
             hooks.setdefault(place, []).append((name, code, line))
     chunks = [_defines(features, precision, lanes, shape, counting), f'#line 1 "lanes.cl"\n{kernel_source("lanes.cl")[0]}']
-    chunks.append(f'#line 1 "structs"\n{_structs(features, precision, entry, shape.block)}')
+    chunks.append(f'#line 1 "structs"\n{_structs(features, precision, lanes, entry, shape.block)}')
     for name in files:
         chunks.append(f'#line 1 "{name}"\n' + _insert(name, kernel_source(name)[0], hooks))
     return _COUNTING.sub(r"\1\2\n" if counting else "\n", "".join(chunks))

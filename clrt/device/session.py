@@ -17,6 +17,7 @@ from clrt.precision import Precision
 from clrt.scene.model import Scene
 
 PREPARE_LOCAL = 64
+OUTERMOST = 32000  #: steps to the direction farthest from the middle: an int16 holds all
 FILM_BYTES = 12  #: a pixel of the film: three float32
 
 
@@ -49,6 +50,7 @@ class Buffers:
 
     def __init__(self, device: Device, packed: Packed, features: Features, precision: Precision) -> None:
         self.device, self.packed, self.features, self.precision = device, packed, features, precision
+        self.lanes = precision.lanes(device.info.lanes)
         self.plane_bytes = max(1, packed.slots) * layout.edge_planes(precision.real).itemsize
         lights = len(packed.scene.lights_with_position)
         self.shared_lights = shares_lights(packed.scene, precision, device, packed.slots)
@@ -65,11 +67,34 @@ class Buffers:
         with_shadows = any(name == "light_planes" for f in features.active for name, _ in f.parameters)
         if with_shadows:
             self.effects["light_planes"] = self.empty(self.plane_bytes * (max(1, lights) if self.shared_lights else 1))
+        self.boxes: list[Any] = []  #: of directions, as seen from the eye, then as from all lights
 
     @property
     def size(self) -> int:
         """Bytes of all buffers: the scene's, and those of effects."""
-        return sum(b.size for b in (self.frame, self.vertices, self.triangles, self.eye_planes, *self.core, *self.effects.values()))
+        own = (self.frame, self.vertices, self.triangles, self.eye_planes)
+        return sum(b.size for b in (*own, *self.core, *self.effects.values(), *self.boxes))
+
+    @property
+    def box_levels(self) -> list[int]:
+        """Records of boxes as seen from one origin: blocks, records of 16 of those, and so on to one. None where every ray meets all triangles."""
+        split = len(self.packed.nodes) > len(self.packed.objects)
+        levels = [len(self.packed.blocks)] if split and len(self.packed.blocks) else []
+        while levels and levels[-1] > 1:
+            levels.append(-(-levels[-1] // layout.BOXES))
+        return levels
+
+    @property
+    def box_count(self) -> int:
+        """All of them, and the one in front of them that tells how directions are measured; or 0."""
+        return 1 + sum(self.box_levels) if self.box_levels else 0
+
+    def make_boxes(self) -> None:
+        """Room for boxes of directions, where the program of these features reads any."""
+        lights = program.lights_grouped(self.features, self.lanes, self.shared_lights)
+        origins = [1, len(self.packed.scene.lights_with_position)] if lights else [1]
+        size = max(1, self.box_count) * layout.direction_boxes().itemsize
+        self.boxes = [self.empty(size * n) for n in origins] if program.grouped(self.features, self.lanes) else []
 
     def _check_memory(self) -> None:
         need, there = self.plane_bytes * 4, self.device.handle.global_mem_size
@@ -107,6 +132,8 @@ class Buffers:
                 )
             if planes:
                 self._prepare_planes(cl.Kernel(built, "prepare_planes"), size, count)
+                if self.boxes and self.box_count:
+                    self._prepare_boxes(built)
             queue.finish()
 
     def _prepare_planes(self, kernel: Any, size: tuple[int], count: np.int32) -> None:
@@ -116,6 +143,46 @@ class Buffers:
             for i, light in enumerate(packed.scene.lights_with_position):
                 first = np.int32(i * packed.slots)
                 kernel(queue, size, local, self.vertices, _double4(np.asarray(light.position)), self.effects["light_planes"], first, count)
+
+    def _prepare_boxes(self, built: Any) -> None:
+        import pyopencl as cl
+
+        packed, local = self.packed, (PREPARE_LOCAL,)
+        levels, blocks = self.box_levels, self.upload(packed.blocks)
+        of_triangles, of_records = cl.Kernel(built, "prepare_directions"), cl.Kernel(built, "prepare_unions")
+        wanted = [(self.boxes[0], 0, packed.scene.camera.eye)]
+        if len(self.boxes) > 1:
+            lights = packed.scene.lights_with_position
+            wanted += [(self.boxes[1], i * self.box_count, np.asarray(light.position)) for i, light in enumerate(lights)]
+        for boxes, first, origin in wanted:
+            scale = direction_scale(origin - packed.origin, packed.objects)
+            size = (multiple(levels[0] * layout.BOXES, PREPARE_LOCAL),)
+            of_triangles(
+                self.device.queue, size, local, self.vertices, blocks, _double4(origin), scale, boxes, np.int32(first), np.int32(levels[0])
+            )
+            below = 1
+            for count in levels[:-1]:
+                size = (multiple(multiple(count, layout.BOXES), PREPARE_LOCAL),)
+                of_records(self.device.queue, size, local, boxes, np.int32(first), np.int32(below), np.int32(below + count), np.int32(count))
+                below += count
+        self.device.queue.finish()
+
+
+def direction_scale(origin: NDArray[np.float64], objects: NDArray[np.void]) -> NDArray[np.float32]:
+    """(4,): the direction to the middle of all objects and the steps a unit in which others are measured from it (cull.cl).
+
+    origin : (3,), relative to what the objects' boxes are relative to
+
+    All objects lie in a sphere, as seen from outside it in a cone: no direction in it is farther from its middle than twice the sine of
+    half its angle. From inside, directions go all around.
+    """
+    lo, hi = objects["lo"].min(0).astype(np.float64), objects["hi"].max(0).astype(np.float64)
+    to_middle, radius = (lo + hi) / 2 - origin, np.linalg.norm(hi - lo) / 2
+    distance = np.linalg.norm(to_middle)
+    if not radius < distance < np.inf:
+        return np.array([0, 0, 0, OUTERMOST], np.float32)
+    farthest = max(2 * np.sin(np.arcsin(radius / distance) / 2), 1e-6)
+    return np.array([*(to_middle / distance), OUTERMOST / farthest], np.float32)
 
 
 def _double4(values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -148,7 +215,7 @@ class Tracer:
         scene = buffers.packed.scene
         self.buffers, self.counting = buffers, counting
         self.width, self.height = scene.camera.width, scene.camera.height
-        self.lanes = buffers.precision.lanes(buffers.device.info.lanes)
+        self.item = program.item_size(buffers.features, buffers.lanes)
         self.film = buffers.empty(self.width * self.height * FILM_BYTES)
         self.kernel = cl.Kernel(built, "render")
         self.counters = np.zeros(len(buffers.features.ray_kinds) + len(scene.objects), np.uint64)
@@ -173,6 +240,11 @@ class Tracer:
         self.stages = StageCounter(buffers) if buffers.precision.decides_in_stages else None
         if self.stages is not None:
             self._after += (self.stages.buffer,)
+        if not buffers.boxes:
+            buffers.make_boxes()
+        if buffers.boxes:
+            eye_boxes, *light_boxes = buffers.boxes
+            self._after += (eye_boxes, np.int32(len(buffers.packed.blocks)), np.int32(buffers.box_count), *light_boxes)
 
     def begin_samples(self, first: int, end: int) -> None:
         """The next rows are those of samples [first, end), which are added to the ones before them. For scenes that are sampled."""
@@ -186,9 +258,9 @@ class Tracer:
         sums : buffer of float64, tile by tile, each (TILE height, width, 3)
         tiles : (n, 4) column and row of the first pixel, seed, and the place of the sums, counted in tiles
         """
-        packet_width, packet_height = program.PACKETS[self.lanes]
-        packets = len(tiles) * (program.TILE[0] // packet_width) * (program.TILE[1] // packet_height)
-        size = program.LOCAL_SIZE[0], multiple(-(-packets // program.LOCAL_SIZE[0]), program.LOCAL_SIZE[1])
+        width, height = self.item
+        items = len(tiles) * (program.TILE[0] // width) * (program.TILE[1] // height)
+        size = program.LOCAL_SIZE[0], multiple(-(-items // program.LOCAL_SIZE[0]), program.LOCAL_SIZE[1])
         given = self.buffers.upload(np.concatenate([np.array([*samples, len(tiles)], np.int32), tiles.ravel()]))
         effects = {"sample_range": given, "sample_sums": sums}
         after = (self.film, *(effects.get(name, own) for name, own in zip(self._effects, self._after[1:], strict=False)))
@@ -204,9 +276,8 @@ class Tracer:
 
     def run(self, first_row: int, end_row: int) -> None:
         """Renders rows [first_row, end_row) and waits for them. In the counting build, adds to `counts`."""
-        packet_width, packet_height = program.PACKETS[self.lanes]
-        columns = multiple(-(-self.width // packet_width), program.LOCAL_SIZE[0])
-        rows = multiple(max(1, -(-(end_row - first_row) // packet_height)), program.LOCAL_SIZE[1])
+        columns = multiple(-(-self.width // self.item[0]), program.LOCAL_SIZE[0])
+        rows = multiple(max(1, -(-(end_row - first_row) // self.item[1])), program.LOCAL_SIZE[1])
         queue = self.buffers.device.queue
         if self.counting:
             self.begin_counting()

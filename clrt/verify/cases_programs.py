@@ -224,5 +224,5 @@ def _contracted(tracer: Tracer):  # type: ignore[no-untyped-def]
 
     buffers = tracer.buffers
     shape = program.Shape(program.stack_size(23), buffers.packed.scene.depth, buffers.shared_lights)
-    source = program.compose(buffers.features, buffers.precision, tracer.lanes, shape)
+    source = program.compose(buffers.features, buffers.precision, tracer.buffers.lanes, shape)
     return cl.Kernel(program.build(buffers.device, source.replace("FP_CONTRACT OFF", "FP_CONTRACT ON")), "render")

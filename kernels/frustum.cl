@@ -1,0 +1,149 @@
+// Provides: group_trace: GROUP packets that share their origin through all triangles of the scene together, for the closest or for any hit.
+// Needs: directions.cl, scene.cl, one triangle_*.cl.  Reads: GROUP (packets), GROUP_STACK (15 for each level of records, and one).
+//
+// The rays of a group are bounded by one interval of directions; as all start at one point, that is all there is to know of them. Records of 16
+// boxes, of blocks of triangles or of other records, are compared with it at once, from near to far: those are the kd-tree's triangles in
+// the order of its leaves, each once (packed.py). Of the blocks that are met, the triangles are picked first for the group, then for each packet.
+//
+// What a ray meets lies in all boxes above it, so nothing is missed. Of hits at equal t the one of the first triangle stays here and in kdtree.cl
+// (`tie`), so both find the same.
+#define SPREAD R(0.06)  // of directions, in a group that goes together: wider ones meet too many boxes by their corners
+#define SLACK R(1.0)
+#define LEAST 2
+
+// The packets of a group, and what is left of them.
+typedef struct {
+    const Rays *rays;
+    Hits *hits;
+    int count;
+    Directions all, packet[GROUP];
+    mask_n active[GROUP];
+    float packet_far[GROUP], far;  // no lane of the packet, of the group needs more of its t
+} Group;
+
+HOT void group_far(Group *group) {
+    group->far = group->packet_far[0];
+    for (int p = 1; p < group->count; p++)
+        if (group->packet_far[p] > group->far) group->far = group->packet_far[p];
+}
+
+// Rounded up, as lanes may be wider than float; below 0 where no lane needs anything.
+HOT void packet_far(Group *group, int p) {
+    const real far = -least_lane(choose(group->active[p], -group->hits[p].t, (real_n)INFINITY));
+    group->packet_far[p] = far < 0 ? -1.0f : (float)(far + R(0x1p-22) * far);
+}
+
+// The triangles of a block that are left of the group's bounds in `picked`, packet by packet.
+HOT void group_test(const Geometry *geometry, Group *group, global const DirectionBoxes *boxes, uint picked, const int any_hit) {
+    int tested = 0;
+    for (int p = 0; p < group->count; p++) {
+        uint met = picked & boxes_met(boxes, group->packet + p, group->packet_far[p]);
+        if (!met) continue;
+        tested = 1;
+        Hits *hits = group->hits + p;
+        //@ count_met
+        for (; met; met &= met - 1)
+            triangle_test(geometry, group->rays + p, (real_n)0, boxes->item[first_bit(met)], 1, group->active[p], hits);
+        if (any_hit) group->active[p] &= is_less(hits->slot, NO_LANES);
+        packet_far(group, p);
+    }
+    if (tested) group_far(group);
+}
+
+HOT void group_walk(const Geometry *geometry, Group *group, const int any_hit) {
+    int stack[GROUP_STACK];
+    float near[GROUP_STACK];
+    int top = 1, block = 0;
+    uint picked = 0;
+    stack[0] = geometry->box_count - 1;
+    near[0] = 0;
+    while (top > 0 || block > 0) {
+        // The next block or record, while the triangles of the block before are on their way from memory.
+        int next = 0;
+        while (top > 0 && !next) {
+            top--;
+            if (near[top] <= group->far) next = stack[top];
+        }
+        uint met = 0;
+        if (next) {
+            global const DirectionBoxes *boxes = geometry->boxes + next;
+            met = boxes_met(boxes, &group->all, group->far);
+            if (next <= geometry->block_count) {
+                for (uint rest = met; rest; rest &= rest - 1) fetch_ahead(geometry->planes + boxes->item[first_bit(rest)]);
+            } else {
+                // Onto the stack, the nearest last.
+                for (const int bottom = top; met; met &= met - 1) {
+                    const int k = first_bit(met);
+                    const float distance = boxes->near[k];
+                    global const char *bytes = (global const char *)(geometry->boxes + boxes->item[k]);
+                    for (int i = 0; i < (int)sizeof(DirectionBoxes); i += 64) fetch_ahead(bytes + i);
+                    int place = top++;
+                    for (; place > bottom && near[place - 1] < distance; place--) {
+                        stack[place] = stack[place - 1];
+                        near[place] = near[place - 1];
+                    }
+                    stack[place] = boxes->item[k];
+                    near[place] = distance;
+                }
+                continue;
+            }
+        }
+        if (block > 0) group_test(geometry, group, geometry->boxes + block, picked, any_hit);
+        block = met ? next : 0;
+        picked = met;
+    }
+}
+
+// Bounds of the directions of some packets: the least of each component, and of its negative.
+typedef struct {
+    real lo[3], minus_hi[3];
+} Spread;
+
+HOT real spread_size(const Spread *of) {
+    real size = 0;
+    for (int a = 0; a < 3; a++)
+        if (-of->minus_hi[a] - of->lo[a] > size) size = -of->minus_hi[a] - of->lo[a];
+    return size;
+}
+
+// Rays as scene_trace takes them, with one origin for all that are active. Apart from the callers: they are few, and this is large.
+static __attribute__((noinline)) void group_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
+    Spread of[GROUP];
+    for (int p = 0; p < GROUP; p++) least_directions(rays + p, rays[p].active, of[p].lo, of[p].minus_hi);
+    for (int begin = 0, count = GROUP; begin < GROUP; begin += count) {
+        // The most packets from here on, by halves of halves, that are near each other: not farther apart than they are wide.
+        Group group;
+        Spread all;
+        for (count = GROUP; ; count /= 2) {
+            if (begin % count) continue;
+            real sum = 0;
+            all = of[begin];
+            for (int p = begin; p < begin + count; p++) {
+                const real wide = spread_size(of + p);
+                if (wide > 0) sum += wide;
+                for (int a = 0; a < 3; a++) {
+                    all.lo[a] = of[p].lo[a] < all.lo[a] ? of[p].lo[a] : all.lo[a];
+                    all.minus_hi[a] = of[p].minus_hi[a] < all.minus_hi[a] ? of[p].minus_hi[a] : all.minus_hi[a];
+                }
+            }
+            if (count == 1 || spread_size(&all) <= (SLACK * sum < SPREAD ? SLACK * sum : SPREAD)) break;
+        }
+        if (all.lo[0] > (real)1.5) continue;
+        if (geometry->box_count == 0 || spread_size(&all) > SPREAD || count < LEAST) {
+            for (int p = begin; p < begin + count; p++) scene_trace(geometry, rays + p, 1, any_hit, hits + p);
+            continue;
+        }
+        group.rays = rays + begin;
+        group.hits = hits + begin;
+        group.count = count;
+        for (int p = 0; p < count; p++) {
+            directions_in_steps(geometry->boxes, of[begin + p].lo, of[begin + p].minus_hi, group.packet + p);
+            group.active[p] = group.rays[p].active;
+            packet_far(&group, p);
+        }
+        directions_in_steps(geometry->boxes, all.lo, all.minus_hi, &group.all);
+        group_far(&group);
+        group_walk(geometry, &group, any_hit);
+        for (int p = 0; p < count; p++) scene_rest(geometry, group.rays + p, group.active[p], 1, any_hit, group.hits + p);
+    }
+}

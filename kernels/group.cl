@@ -1,0 +1,67 @@
+// Provides: render_group: GROUP packets of pixels, whose rays from the eye go together.
+// Needs: render.cl, frustum.cl.  Reads: GROUP, GROUP_WIDTH (packets), PACKET_WIDTH, PACKET_HEIGHT.
+
+//@hook group
+// The packets of one work-item: what the eye sees of them all, then one by one what comes of it.
+static __attribute__((noinline)) void
+render_group(const int group_column, const int group_row, global const Frame *frame, global const int2 *nodes, global const int *indices,
+             global const Triangle *triangles, global const EdgePlanes *eye_planes, global const double *vertices, global const Object *objects,
+             global const Surface *surfaces, global const Material *materials, int end_row, global float *film
+             //@ parameters
+             //@ packet_parameters
+) {
+    Geometry geometry = scene_geometry(frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces);
+    //@ begin
+    Rays eye_rays[GROUP];
+    Hits eye_hits[GROUP];
+    Hit eye_hit[GROUP];
+    for (int p = 0; p < GROUP; p++) {
+        const int column = group_column + ((p & 1) | (p >> 2 << 1)) * PACKET_WIDTH, row = group_row + ((p >> 1) & 1) * PACKET_HEIGHT;
+        Rays rays;
+        //@ camera
+        eye_rays[p] = rays;
+        Hits hits;
+        hits.t = (real_n)INFINITY;
+        hits.slot = (mask_n)-1;
+        //@ hits_begin
+        eye_hits[p] = hits;
+    }
+    group_trace(&geometry, eye_rays, 0, eye_hits);
+    for (int p = 0; p < GROUP; p++) hit_surface(&geometry, frame, surfaces, eye_rays + p, eye_hits + p, eye_hit + p);
+    //@ group_seen
+    for (int p = 0; p < GROUP; p++) {
+        const int column = group_column + ((p & 1) | (p >> 2 << 1)) * PACKET_WIDTH, row = group_row + ((p >> 1) & 1) * PACKET_HEIGHT;
+        if (column >= frame->width || row >= end_row) continue;
+        render_packet(column, row, frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces, materials, end_row, film
+                      //@ arguments
+                      //@ packet_arguments
+                      , eye_rays + p, eye_hits + p, eye_hit + p
+                      //@ seen_arguments
+        );
+    }
+}
+
+//@end
+//@hook group_parameters
+                   , const Rays *eye_rays, const Hits *eye_hits, const Hit *eye_hit
+                   //@ seen_parameters
+//@end
+//@hook eye_rays
+    rays = *eye_rays;
+    int from_group = 1;  // whether what the group has found is this round's
+//@end
+//@hook eye_trace
+        hits = *eye_hits;
+//@end
+//@hook surface
+        if (from_group) hit = *eye_hit;
+        else hit_surface(&geometry, frame, surfaces, &rays, &hits, &hit);
+        //@ surface_seen
+        from_group = 0;
+//@end
+//@hook launch
+    render_group(column, row, frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces, materials, end_row, film
+                 //@ arguments
+                 //@ packet_arguments
+    );
+//@end
