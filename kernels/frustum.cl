@@ -8,8 +8,6 @@
 // What a ray meets lies in all boxes above it, so nothing is missed. Of hits at equal t the one of the first triangle stays here and in kdtree.cl
 // (`tie`), so both find the same.
 #define SPREAD R(0.06)  // of directions, in a group that goes together: wider ones meet too many boxes by their corners
-#define SLACK R(1.0)
-#define LEAST 2
 
 // The packets of a group, and what is left of them.
 typedef struct {
@@ -126,10 +124,10 @@ static __attribute__((noinline)) void group_trace(const Geometry *geometry, cons
                     all.minus_hi[a] = of[p].minus_hi[a] < all.minus_hi[a] ? of[p].minus_hi[a] : all.minus_hi[a];
                 }
             }
-            if (count == 1 || spread_size(&all) <= (SLACK * sum < SPREAD ? SLACK * sum : SPREAD)) break;
+            if (count == 1 || spread_size(&all) <= (sum < SPREAD ? sum : SPREAD)) break;
         }
         if (all.lo[0] > (real)1.5) continue;
-        if (geometry->box_count == 0 || spread_size(&all) > SPREAD || count < LEAST) {
+        if (geometry->box_count == 0 || spread_size(&all) > SPREAD) {
             for (int p = begin; p < begin + count; p++) scene_trace(geometry, rays + p, 1, any_hit, hits + p);
             continue;
         }

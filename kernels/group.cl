@@ -1,7 +1,11 @@
 // Provides: render_group: GROUP packets of pixels, whose rays from the eye go together.
-// Needs: render.cl, frustum.cl.  Reads: GROUP, GROUP_WIDTH (packets), PACKET_WIDTH, PACKET_HEIGHT.
+// Needs: render.cl, frustum.cl.  Reads: GROUP (at most 16, whole rows of 4), PACKET_WIDTH, PACKET_HEIGHT.
 
 //@hook group
+// Where a packet is in its group, in Morton order: packets in a row are near each other.
+#define GROUP_X(p) (((p) & 1) | (((p) >> 1) & 2))
+#define GROUP_Y(p) ((((p) >> 1) & 1) | (((p) >> 2) & 2))
+
 // The packets of one work-item: what the eye sees of them all, then one by one what comes of it.
 static __attribute__((noinline)) void
 render_group(const int group_column, const int group_row, global const Frame *frame, global const int2 *nodes, global const int *indices,
@@ -16,7 +20,7 @@ render_group(const int group_column, const int group_row, global const Frame *fr
     Hits eye_hits[GROUP];
     Hit eye_hit[GROUP];
     for (int p = 0; p < GROUP; p++) {
-        const int column = group_column + ((p & 1) | (p >> 2 << 1)) * PACKET_WIDTH, row = group_row + ((p >> 1) & 1) * PACKET_HEIGHT;
+        const int column = group_column + GROUP_X(p) * PACKET_WIDTH, row = group_row + GROUP_Y(p) * PACKET_HEIGHT;
         Rays rays;
         //@ camera
         eye_rays[p] = rays;
@@ -30,7 +34,7 @@ render_group(const int group_column, const int group_row, global const Frame *fr
     for (int p = 0; p < GROUP; p++) hit_surface(&geometry, frame, surfaces, eye_rays + p, eye_hits + p, eye_hit + p);
     //@ group_seen
     for (int p = 0; p < GROUP; p++) {
-        const int column = group_column + ((p & 1) | (p >> 2 << 1)) * PACKET_WIDTH, row = group_row + ((p >> 1) & 1) * PACKET_HEIGHT;
+        const int column = group_column + GROUP_X(p) * PACKET_WIDTH, row = group_row + GROUP_Y(p) * PACKET_HEIGHT;
         if (column >= frame->width || row >= end_row) continue;
         render_packet(column, row, frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces, materials, end_row, film
                       //@ arguments

@@ -168,7 +168,7 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     names = {f.name for f in features.active}
     values |= dict(zip(("ITEM_WIDTH", "ITEM_HEIGHT"), item_size(features, lanes), strict=True))
     if grouped(features, lanes):
-        values |= {"GROUP": GROUP[0] * GROUP[1], "GROUP_WIDTH": GROUP[0], "BOXES": layout.BOXES, "GROUP_STACK": GROUP_STACK}
+        values |= {"GROUP": GROUP[0] * GROUP[1], "BOXES": layout.BOXES, "GROUP_STACK": GROUP_STACK}
     if "sampling" in names:
         values |= {"TILE_WIDTH": TILE[0], "TILE_HEIGHT": TILE[1]}
     if "shadows" in names:
