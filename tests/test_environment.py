@@ -238,6 +238,7 @@ def test_ball_in_a_uniform_environment_shows_its_colour(shape: tuple[int, int]) 
     assert_mean(seeds(scene, 32, 24), np.broadcast_to([0.2, 0.8, 1.2], (8, 8, 3)))
 
 
+@pytest.mark.slow
 def test_highlight_in_a_uniform_environment_is_its_integral() -> None:
     """Met square-on, the integral of Ks (R.V)^n / pi is 2 Ks / (n + 1): all of the lobe is above the surface."""
     text = "E 0 0 0\nV 0 0 1\nF 1e-3\nR 4 4\nM 0.5 1 0.75  0 0 0.6 8  0\nT -9 -9 5 9 -9 5 0 9 5\n"
@@ -289,7 +290,7 @@ def test_picture_agrees_with_the_path_tracer(text: str, changes: dict[str, Any])
     assert verdict.accepted, verdict.worst
 
 
-@pytest.mark.matrix(keep=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["fast", "exact"])
 def test_every_rung_gives_the_same_mean(precision: str) -> None:
     scene = lit(CAMERA.replace("R 40 32", "R 10 8") + MATT, spiky(3, 5, seed=9) + 0.05, samples=128)

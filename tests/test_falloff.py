@@ -58,7 +58,7 @@ ONE = "spot -2 3 1  2 -3.2 1.7  50 softness=0.6 falloff=yes intensity=20\n"
 SEVERAL = "spot -1 2 1  0 0 1  360 falloff=yes intensity=5\nL 5 5 -5 0.2 0.2 0.2\nsun 1 3 -1 intensity=0.2\n"
 
 
-@pytest.mark.parametrize("lamp", [ONE, SEVERAL])
+@pytest.mark.parametrize("lamp", [pytest.param(ONE, marks=pytest.mark.slow), SEVERAL])
 def test_picture_matches_reference(lamp: str) -> None:
     scene = parse_scene(BODIES + lamp)
     pixels, reference = clrt.render(scene).pixels, render(scene)

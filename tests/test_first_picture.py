@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from clrt import renderer
-from clrt.device import ahead, program
+from clrt.device import ahead, kernel_cache, program
 from clrt.device.context import POCL, Device
 from clrt.errors import DeviceError, LimitError
 from clrt.features import Features
@@ -167,7 +167,8 @@ def test_kernels_are_compiled_for_the_sizes_of_later_launches(tmp_path: Path, sc
     assert names == ["prepare_planes.so", "prepare_triangles.so", "render.so"]
 
 
-def test_error_of_the_compiler_comes_out_of_the_thread(device: Device) -> None:
+def test_error_of_the_compiler_comes_out_of_the_thread(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))  # the folder that is emptied, as a broken entry may be the reason
     compilation = ahead.Compilation(device, "kernel void render(global int *x) { x[0] = nothing; }", 1)
     with pytest.raises(DeviceError, match="could not compile"):
         ahead.build(device, compilation.source, compilation)

@@ -56,7 +56,7 @@ def test_samples_match_the_reference(text: str, precision: str) -> None:
     _agrees(scene, clrt.render(scene, precision=precision, seed=7).pixels, 7, 24 if rung(precision).bits == 32 else 32, precision)
 
 
-@pytest.mark.matrix(keep=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_the_reference(device: Device, lanes: int) -> None:
     scene = replace(parse_scene(BOUNCING).with_size(21, 13), samples=2, seed=3)

@@ -65,7 +65,7 @@ MATERIAL = "M 0.9 0.8 1 0.3 0.6 0.2 20 0.1\n"
 MAPPED = "normalmap soft.png strength=0.7\nproject axis=y scale=1.7\n"
 
 
-@pytest.mark.matrix(keep=3)
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize(
     "scene",
     [
@@ -81,7 +81,7 @@ def test_picture_matches_reference(write: Write, scene: str) -> None:
     _compare(loaded, clrt.render(loaded).pixels)
 
 
-@pytest.mark.matrix(keep=2)
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize(("precision", "lanes"), [*((name, 16) for name in sorted(RUNGS)), ("watertight", 8), ("exact", 4), ("double", 1)])
 def test_every_rung_and_width_matches_reference(write: Write, device: Device, precision: str, lanes: int) -> None:
     scene = write(HEAD + MATERIAL + MAPPED + FLOOR + TURNED + CURVED + ROUND).with_size(16, 16)

@@ -58,7 +58,7 @@ def _compare(scene: Scene, pixels: np.ndarray) -> None:
     assert expected.pixels.std() > 0.05
 
 
-@pytest.mark.matrix(keep=3)
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize(
     "look",
     [
@@ -77,7 +77,7 @@ def test_picture_matches_reference(write: Write, look: str) -> None:
     _compare(scene, clrt.render(scene).pixels)
 
 
-@pytest.mark.matrix(keep=2)
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize(("precision", "lanes"), [*((name, 16) for name in sorted(RUNGS)), ("watertight", 8), ("exact", 4), ("double", 1)])
 def test_every_rung_and_width_matches_reference(write: Write, device: Device, precision: str, lanes: int) -> None:
     scene = write(HEAD + LIGHTS + MATERIAL + "opacity 0.4\ntexture soft.png alpha=yes\n" + THINGS + FLOOR).with_size(16, 16)
@@ -154,7 +154,7 @@ CEILING = "T -90 9 -90 90 9 -90 0 9 90\n"
 PANE = "T -90 2 -90 90 2 -90 0 2 90\n"
 
 
-@pytest.mark.matrix(keep=2)
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize(
     ("light", "metal"),
     [("L 0 4 0\n", "material roughness=0.4\n"), ("sun 0 1 -0.5\n", "material metallic=1 roughness=0.5\n"), ("sun 0 1 -0.5\n", "")],

@@ -47,7 +47,7 @@ def test_comment_of_the_scene_holds() -> None:
         assert pixels[int(row), int(column)].tolist() == [float(c) for c in color], (column, row)
 
 
-@pytest.mark.matrix(keep=2)
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 def test_mean_of_samples_matches_the_reference(precision: str) -> None:
     scene = replace(parse_scene(TEXT), samples=3)
@@ -59,7 +59,7 @@ def test_mean_of_samples_matches_the_reference(precision: str) -> None:
 
 
 @pytest.mark.matrix(keep=1)
-@pytest.mark.parametrize("lanes", [16, 8, 4, 1])
+@pytest.mark.parametrize("lanes", [8, 16, 4, 1])
 def test_every_packet_width_takes_the_same_samples(device: Device, lanes: int) -> None:
     scene = replace(parse_scene(TEXT).with_size(21, 13), samples=2, seed=3)
     narrow = replace(device, info=replace(device.info, lanes=lanes))
