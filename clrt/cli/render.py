@@ -148,11 +148,11 @@ def _check(options: Options, scene_path: Path, picture: Path) -> None:
 
 def _open_device(options: Options) -> Task[Device]:
     """The device, which another thread opens while the scene is read."""
-    from clrt.device import context, kernel_cache
+    from clrt.device import early, kernel_cache
 
     if not options.cache:
         kernel_cache.use_temporary_folder()
-    return Task(partial(context.open_device, options.device))
+    return Task(partial(early.open_device, options.device))
 
 
 def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene, float]:

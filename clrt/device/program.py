@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from clrt.device import kernel_cache, layout
-from clrt.device.context import Device
+from clrt.device import kernel_cache, layout, lean
+from clrt.device.context import POCL, Device
 from clrt.errors import DeviceError, LimitError
 from clrt.features import REAL, Features
 from clrt.precision import Precision
@@ -255,15 +255,16 @@ def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> An
 
     check_options((*options, *os.environ.get("PYOPENCL_BUILD_OPTIONS", "").split()))  # pyopencl adds these to ours
     error: Exception | None = None
-    for text in (source, source + "\n// built again, past the cache\n"):
+    for text, more in lean.attempts(kernel_folder(), source, pocl=device.info.platform == POCL):
         try:
             with warnings.catch_warnings(), kernel_cache.loading():
                 warnings.simplefilter("ignore", cl.CompilerWarning)
-                built = cl.Program(device.context, text).build(options=list(options))
-                for name in _KERNEL.findall(text):  # what a broken entry lacks is missed only when it is asked for
+                built = cl.Program(device.context, text).build(options=[*options, *more])
+                for name in _KERNEL.findall(source):  # what a broken entry lacks is missed only when it is asked for
                     cl.Kernel(built, name)
             return built
         except cl.Error as failure:
             error = failure
-            kernel_cache.suspect()
+            if not (more and lean.lacks(failure)):
+                kernel_cache.suspect()
     raise DeviceError(f"the device '{device.info.name}' could not compile the program: {error}") from error
