@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from device_pictures import in_packets
 
 import clrt
 from clrt import renderer
@@ -344,10 +345,7 @@ def test_picture_does_not_depend_on_launches(device: Device) -> None:
 @pytest.mark.parametrize("lanes", [8, 4, 1])
 def test_every_packet_width_takes_the_same_samples(device: Device, lanes: int) -> None:
     scene = lit(CAMERA + MATT, spiky(8, 16), samples=2)
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
-    tracer = renderer.open_tracer(renderer.build_trees(scene, "sah", quiet), Features.of(scene), rung("watertight"), narrow, quiet)[1]
-    renderer.run_rows(tracer, "render", quiet)
-    off = np.abs(tracer.picture() - clrt.render(scene).pixels).max(-1)
+    off = np.abs(in_packets(scene, device, lanes) - clrt.render(scene).pixels).max(-1)
     assert (off > 1e-4).mean() < 0.01
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from device_pictures import in_packets
 
 import clrt
 from clrt.device import program
@@ -17,7 +18,6 @@ from clrt.features import Features
 from clrt.features.camera import lens_axes
 from clrt.precision import RUNGS, rung
 from clrt.reference.sampled import disc_points, render_samples
-from clrt.renderer import build_trees, open_tracer, run_rows
 from clrt.scene.build import parse_scene
 from clrt.scene.model import Scene
 from clrt.scene.scale import scaled
@@ -44,10 +44,6 @@ def _agrees(scene: Scene, pixels: np.ndarray, seed: int, bits: int, precision: s
     assert wrong.sum() <= 0.02 * wrong.size
 
 
-def _quiet(phase: str, fraction: float) -> None:
-    """No progress."""
-
-
 @pytest.mark.matrix(keep=3)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 @pytest.mark.parametrize("text", [FLAT, BOUNCING, OBLIQUE], ids=["flat", "bouncing", "oblique"])
@@ -60,10 +56,7 @@ def test_samples_match_the_reference(text: str, precision: str) -> None:
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_the_reference(device: Device, lanes: int) -> None:
     scene = replace(parse_scene(BOUNCING).with_size(21, 13), samples=2, seed=3)
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
-    tracer = open_tracer(build_trees(scene, "sah", _quiet), Features.of(scene), rung("watertight"), narrow, _quiet)[1]
-    run_rows(tracer, "render", _quiet)
-    _agrees(scene, tracer.picture(), 3, 24)
+    _agrees(scene, in_packets(scene, device, lanes), 3, 24)
 
 
 def test_one_sample_goes_through_the_lens() -> None:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from device_pictures import in_packets
 
 import clrt
 from clrt.device import program
@@ -17,7 +18,6 @@ from clrt.errors import SceneError
 from clrt.features import Features
 from clrt.precision import RUNGS, rung
 from clrt.reference.sampled import SampledPicture, at_time, render_samples, sample_times
-from clrt.renderer import build_trees, open_tracer, run_rows
 from clrt.scene.build import parse_scene
 from clrt.scene.model import Scene
 from clrt.scene.scale import scaled
@@ -64,10 +64,6 @@ def _agrees(pixels: np.ndarray, reference: SampledPicture, precision: str = "wat
     assert wrong.sum() <= 1
 
 
-def _quiet(phase: str, fraction: float) -> None:
-    """No progress."""
-
-
 @pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize("name", SCENES)
 def test_samples_match_the_reference(name: str) -> None:
@@ -87,10 +83,7 @@ def test_rungs_match_the_reference(name: str, precision: str) -> None:
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_the_reference(device: Device, lanes: int) -> None:
     scene, reference = _seen("smooth", 24)
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
-    tracer = open_tracer(build_trees(scene, "sah", _quiet), Features.of(scene), rung("watertight"), narrow, _quiet)[1]
-    run_rows(tracer, "render", _quiet)
-    _agrees(tracer.picture(), reference)
+    _agrees(in_packets(scene, device, lanes), reference)
 
 
 @pytest.mark.slow

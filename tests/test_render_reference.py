@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from device_pictures import in_packets
 
 import clrt.reference
 from clrt import renderer
@@ -101,10 +102,7 @@ def test_rabbit_like_mesh_matches_reference() -> None:
 def test_every_packet_width_gives_the_same_picture(device: Device, lanes: int) -> None:
     """Widths differ only in how operations are fused, so pictures agree but for pixels at an edge."""
     scene = parse_scene(SCENES["glass in glass"]).with_size(61, 47)
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
-    tracer = renderer.open_tracer(renderer.build_trees(scene, "sah", _quiet), Features.of(scene), rung("watertight"), narrow, _quiet)[1]
-    renderer.run_rows(tracer, "render", _quiet)
-    _compare(scene, tracer.picture())
+    _compare(scene, in_packets(scene, device, lanes))
 
 
 def test_picture_does_not_depend_on_launches(device: Device) -> None:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from device_pictures import in_packets
 from reference_scenes import globe
 
 import clrt
-from clrt import renderer
 from clrt.device import program
 from clrt.device.context import Device
 from clrt.device.program import Shape
@@ -89,14 +88,7 @@ def test_every_rung_matches_reference(precision: str, body: str) -> None:
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_reference(device: Device, lanes: int) -> None:
     scene, reference = _reference("balls", "all")
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
-    tracer = renderer.open_tracer(renderer.build_trees(scene, "sah", _quiet), Features.of(scene), rung("watertight"), narrow, _quiet)[1]
-    renderer.run_rows(tracer, "render", _quiet)
-    _compare(tracer.picture(), reference)
-
-
-def _quiet(phase: str, fraction: float) -> None:
-    pass
+    _compare(in_packets(scene, device, lanes), reference)
 
 
 # Closed forms
