@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import click
 
 from clrt.cli import arguments as kinds
-from clrt.cli import streams
+from clrt.cli import paths, streams
 from clrt.cli.failure import FAULT
 from clrt.cli.progress import PhaseProgress
-from clrt.files import atomic_write, check_writable
+from clrt.files import check_writable
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -62,7 +62,7 @@ def verify(full: bool, numbers: tuple[int, ...], json_path: Path | None, page: P
         results = run_in_two(cases, context, lambda _, done: progress("running the hard cases", done))
         taken = time.perf_counter() - start
     if json_path is not None:
-        _write_json(json.dumps(to_json(results, context), indent=2, ensure_ascii=False) + "\n", json_path)
+        paths.write_text(json.dumps(to_json(results, context), indent=2, ensure_ascii=False) + "\n", json_path)
     if page is not None:
         _write_page(markdown_table(results, context), page)
     if not quiet and json_path is not kinds.STDOUT:
@@ -73,22 +73,13 @@ def verify(full: bool, numbers: tuple[int, ...], json_path: Path | None, page: P
     return FAULT if broken else 0
 
 
-def _write_json(text: str, path: Path) -> None:
-    if path is kinds.STDOUT:
-        streams.write(text)
-    else:
-        with atomic_write(path) as file:
-            file.write(text.encode())
-
-
 def _write_page(text: str, page: Path) -> None:
     """The table into the marked place of a page that has one, or as the whole of the file."""
     found = page.read_text(encoding="utf-8") if page.exists() else ""
     if _BEGIN in found and _END in found:
         before, after = found.partition(_BEGIN)[0], found.partition(_END)[2]
         text = f"{before}{_BEGIN}\n{text}\n{_END}{after}"
-    with atomic_write(page) as file:
-        file.write(text.encode())
+    paths.write_text(text, page)
 
 
 def markdown_table(results: list[Result], context: Context) -> str:
