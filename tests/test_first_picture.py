@@ -20,6 +20,7 @@ from clrt.features import Features
 from clrt.kdtree.saved import LEAST_TRIANGLES
 from clrt.renderer import with_options
 from clrt.scene.build import parse_scene
+from clrt.scene.saved import LEAST_CHARACTERS
 from clrt.tasks import Task
 
 HEAD = "E 0 0 -1\nV 0 0 1\nF 45\nR 32 24\nL 5 5 -5\nM 1 0.5 0.2 0.2 0.8 0 1 0\n"
@@ -37,8 +38,12 @@ def scene_text(triangles: int) -> str:
 
 @pytest.fixture
 def scene(tmp_path: Path) -> Path:
+    """Of which what is read is kept, and the tree."""
     path = tmp_path / "scene.txt"
-    path.write_text(scene_text(LEAST_TRIANGLES + 100))
+    text = scene_text(3500)
+    assert len(text) > LEAST_CHARACTERS
+    assert text.count("\nT") > LEAST_TRIANGLES
+    path.write_text(text)
     return path
 
 

@@ -152,19 +152,26 @@ def _open_device(options: Options) -> Task[Device]:
 
     if not options.cache:
         kernel_cache.use_temporary_folder()
+    kernel_cache.choose_folder()
     return Task(partial(early.open_device, options.device))
 
 
 def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene, float]:
     """The scene and the seconds it took; its warnings are printed."""
+    from clrt.device.kernel_cache import own_folder
+    from clrt.scene import saved
     from clrt.scene.build import load_scene
+    from clrt.store import Store
 
     progress("read", 0.0)
     start = time.perf_counter()
+    texts = saved.SavedTexts(Store(own_folder("texts"), saved.LIMIT)) if options.cache else None
     scene = load_scene(
         path, right_handed=options.right_handed, split_objects=options.split_objects, allow_paths=options.allow_path,
-        camera=options.camera,
-    )
+        camera=options.camera, saved=texts,
+    )  # fmt: skip
+    if texts is not None:
+        Task(texts.keep)
     for warning in scene.warnings:
         failure.warn(f"{scene.source}: {warning}")
     return scene, time.perf_counter() - start
