@@ -145,6 +145,16 @@ def test_fault_of_the_scene_is_said_before_anything_is_kept(tmp_path: Path, scen
     assert kept(tmp_path / "cache") == set()
 
 
+def test_compiler_is_not_taken_apart_at_the_end(tmp_path: Path, scene: Path) -> None:
+    """Which would take as long as a hundred thousand small objects need, in front of a user who has the picture."""
+    code = "import clrt.cli.render, weakref\nfrom clrt.device import context\nseen, opened = [], context.open_device\n"
+    code += "context.open_device = lambda *given: (device := opened(*given), seen.append(weakref.ref(device)))[0]\n"
+    code += "def end(code):\n    print(len(seen), seen[0]() is not None, flush=True)\n    leave(code)\n"
+    code = f"import os, sys\nleave = os._exit\n{code}os._exit = end\n{command(str(scene), '-q')}"
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["1", "True"]
+
+
 def test_unknown_device_is_said_as_without_threads(tmp_path: Path, scene: Path) -> None:
     arguments = [sys.executable, "-m", "clrt", str(scene), "-o", str(tmp_path / "picture.png"), "--device", "no such device"]
     done = subprocess.run(arguments, capture_output=True, text=True, check=False)

@@ -50,6 +50,8 @@ class Options:
     cache: bool
 
 
+#: the device, until the process ends: freeing it would take apart, piece by piece, all that a compiler has in memory
+_open: list[Task[Device]] = []
 #: what follows a render: seconds to print figures and to end, and seconds a pixel to write a picture, and as many for a second one
 _AFTER_S, _AFTER_PIXEL_S = 0.2, 6e-8
 
@@ -153,7 +155,9 @@ def _open_device(options: Options) -> Task[Device]:
     if not options.cache:
         kernel_cache.use_temporary_folder()
     kernel_cache.choose_folder()
-    return Task(partial(early.open_device, options.device))
+    opening = Task(partial(early.open_device, options.device))
+    _open.append(opening)
+    return opening
 
 
 def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene, float]:

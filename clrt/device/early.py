@@ -8,6 +8,7 @@ the program nothing is kept. Whatever fails here is left to the usual way, which
 
 from __future__ import annotations
 
+import importlib
 import importlib.machinery
 import importlib.util
 import os
@@ -33,7 +34,12 @@ _OPTIONS = " ".join(("-cl-std=CL1.2", *lean.OPTIONS)).encode()
 
 def open_device(name: str | None = None) -> Device:
     """As `context.open_device`; where no program is compiled yet, the default device's library is being read from then on."""
-    return context.open_device(name, {} if name else begin())
+    begun = {} if name else begin()
+    opened = context.open_device(name, begun)
+    if begun:
+        with suppress(ImportError):  # what the first kernel would import while the compiler waits for it
+            importlib.import_module("pyopencl.invoker")
+    return opened
 
 
 def begin() -> Mapping[int, Any]:
