@@ -121,5 +121,5 @@ def open_device(name: str | None = None, contexts: Mapping[int, Any] | None = No
         pocl_cpu.name_processor(handle)
     import pyopencl as cl
 
-    context = (contexts or {}).get(handle.int_ptr) or cl.Context([handle])
+    context = (contexts.get(handle.int_ptr) if contexts else None) or cl.Context([handle])
     return Device(info, handle, context, cl.CommandQueue(context))
