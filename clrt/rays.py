@@ -71,7 +71,7 @@ class RayCaster:
         self._packed = pack(scene, self.trees, features, self.precision)
         width = max(4, self.precision.lanes(self._device.info.lanes))
         wide = wide_arrays(self._packed, self.trees, width)
-        shape = program.Shape(wide.stack, block=width)
+        shape = program.Shape(0, block=width, wide=wide.stack)
         built = program.build(self._device, program.compose(features, self.precision, 1, shape, entry="cast"))
         self._buffers = Buffers(self._device, self._packed, features, self.precision)
         self._buffers.prepare(built, planes=False)

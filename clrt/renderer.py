@@ -189,13 +189,13 @@ def build_trees(scene: Scene, tree: str, tell: Progress, device: Device | None =
     return Prepared(scene, tuple(trees), tuple(seconds))
 
 
-def program_shape(prepared: Prepared, features: Features, shared_lights: bool) -> program.Shape:
+def program_shape(prepared: Prepared, features: Features, shared_lights: bool, wide: int = program.WIDE_STACK) -> program.Shape:
     """The sizes that the program of these features is compiled for: trees as deep as they may become, so that they need not be there."""
     bounces = any(f.name == "bounce" for f in features.active)
     scene = prepared.scene
     deepest = max([default_max_depth(len(o)) for o in scene.objects] + [t.depth for t in prepared.trees], default=0)
     boxes = depth_limit(len(scene.objects) + placement_count(scene) + len(scene.spheres))
-    return program.Shape(program.stack_size(deepest), scene.depth if bounces else 0, shared_lights, program.stack_size(boxes))
+    return program.Shape(program.stack_size(deepest), scene.depth if bounces else 0, shared_lights, program.stack_size(boxes), wide=wide)
 
 
 def _as_called(prepared: Prepared, features: Features) -> Prepared:
@@ -213,7 +213,8 @@ def fill_buffers(prepared: Prepared, features: Features, precision: Precision, d
     start = time.perf_counter()
     buffers = Buffers(device, pack(prepared.scene, prepared.trees, features, precision), features, precision)
     upload_s = time.perf_counter() - start
-    return buffers, program.compose(features, precision, lanes, program_shape(prepared, features, buffers.shared_lights)), upload_s
+    shape = program_shape(prepared, features, buffers.shared_lights, buffers.wide_stack)
+    return buffers, program.compose(features, precision, lanes, shape), upload_s
 
 
 def _begin_program(scene: Scene, features: Features, precision: Precision, device: Device) -> Compilation:
@@ -280,7 +281,7 @@ def _count(prepared: Prepared, buffers: Buffers, stats: RunStats, tell: Progress
     """The same picture again by the counting build, by the same launches if it was made of replicates: rays by kind, tests by object."""
     precision, device = buffers.precision, buffers.device
     lanes = precision.lanes(device.info.lanes)
-    shape = program_shape(_as_called(prepared, buffers.features), buffers.features, buffers.shared_lights)
+    shape = program_shape(_as_called(prepared, buffers.features), buffers.features, buffers.shared_lights, buffers.wide_stack)
     tracer = Tracer(
         buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True
     )

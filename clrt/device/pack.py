@@ -118,6 +118,7 @@ def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: P
         origins=object_origins(scene, origin),
         real=real,
         features=features,
+        trees=tuple(trees),
     )
 
 

@@ -43,6 +43,7 @@ LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, si
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
 RUN = 32  #: rays of a work-item in arrays of rays
 SORT_BITS = 3  #: an axis, of the grid of origins by which rays are sorted; measured: more bits save nothing
+WIDE_STACK = 16  #: entries of the stack of wide trees, where none is deeper: with 16 children a node, few are
 MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
 #: what stands at a place where no effect adds anything
 _DEFAULTS = {"trace": "        scene_trace(&geometry, &rays, 1, 0, &hits);", "next": "        break;",
@@ -63,6 +64,7 @@ class Shape:
     shared_lights : whether edge planes as seen from the lights are at hand
     tree : entries of the stack of the tree over boxes, at least its depth
     block : of arrays of rays, the triangles that are tested at once
+    wide : entries of the stack of wide trees, at least the depth of the deepest
     """
 
     stack: int
@@ -70,11 +72,17 @@ class Shape:
     shared_lights: bool = True
     tree: int = 8
     block: int = 0
+    wide: int = WIDE_STACK
 
 
 def bounce_stack(features: Features, depth: int) -> int:
     """Packets that may wait: each that is taken off puts on one for each branch, `depth` times in a row; and one to spare."""
     return (max(2, sum(f.branches for f in features.active)) - 1) * depth + 2
+
+
+def block_width(lanes: int) -> int:
+    """The triangles of a block, and the children of a wide node, on a device that holds `lanes` numbers in a vector."""
+    return max(4, lanes)
 
 
 def stack_size(tree_depth: int) -> int:
@@ -109,8 +117,9 @@ def _structs(features: Features, precision: Precision, entry: str, block: int) -
         ("Emitter", layout.emitter), ("Placement", layout.placement), ("EnvironmentRow", layout.environment_row),
     )  # fmt: skip
     names += [(name, make(real)) for name, make in optional if f" {name} " in declared]
-    if entry == "cast":
+    if entry == "cast" or " WideNode " in declared:
         names += [("WideNode", layout.wide_node(real, block)), ("Block", layout.block(real, block))]
+    if entry == "cast":
         names += [("GivenRay", layout.GIVEN_RAY), ("HitSource", layout.HIT_SOURCE), ("HitRecord", layout.HIT_RECORD)]
     return "".join(layout.c_struct(name, dtype) for name, dtype in names)
 
@@ -135,8 +144,10 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     values: dict[str, int] = {"REAL_BITS": precision.bits, "LANES": lanes, "PACKET_WIDTH": width, "PACKET_HEIGHT": height,
                               "STACK_SIZE": shape.stack}  # fmt: skip
     if shape.block:
-        values |= {"BLOCK": shape.block, "SORT_BITS": SORT_BITS, "RUN": RUN}
+        values |= {"BLOCK": shape.block, "WIDE_STACK": shape.wide, "SORT_BITS": SORT_BITS, "RUN": RUN}
     names = {f.name for f in features.active}
+    if "single rays" in names:
+        values |= {"BLOCK": block_width(lanes), "WIDE_STACK": shape.wide}
     if "sampling" in names:
         values |= {"TILE_WIDTH": TILE[0], "TILE_HEIGHT": TILE[1]}
     if "shadows" in names:
@@ -201,7 +212,7 @@ def compose(features: Features, precision: Precision, lanes: int, shape: Shape, 
         for place, code, line in kernel_source(name)[1]:
             hooks.setdefault(place, []).append((name, code, line))
     chunks = [_defines(features, precision, lanes, shape, counting), f'#line 1 "lanes.cl"\n{kernel_source("lanes.cl")[0]}']
-    chunks.append(f'#line 1 "structs"\n{_structs(features, precision, entry, shape.block)}')
+    chunks.append(f'#line 1 "structs"\n{_structs(features, precision, entry, shape.block or block_width(lanes))}')
     for name in files:
         chunks.append(f'#line 1 "{name}"\n' + _insert(name, kernel_source(name)[0], hooks))
     return _COUNTING.sub(r"\1\2\n" if counting else "\n", "".join(chunks))
@@ -218,6 +229,8 @@ def private_bytes(precision: Precision, lanes: int, shape: Shape, features: Feat
     traversal = shape.stack * (2 * lane_bytes + 4) * copies
     if "object tree" in names:
         traversal += shape.tree * (lane_bytes + 4) * copies + ("placed" in names) * shape.stack * (2 * lane_bytes + 4) * copies
+    if "single rays" in names:
+        traversal += shape.wide * (block_width(lanes) * (precision.bits // 8 + 4) + 4)
     return traversal + (entry * (bounce_stack(features, shape.depth) + 2) if "bounce" in names else 0) + (16 << 10)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clrt.device import kernel_cache, layout, program
+from clrt.device.arrays_wide import wide_trees
 from clrt.device.context import Device
 from clrt.device.effect_arrays import PACKERS
 from clrt.device.packed import Packed
@@ -18,6 +20,7 @@ from clrt.scene.model import Scene
 
 PREPARE_LOCAL = 64
 FILM_BYTES = 12  #: a pixel of the film: three float32
+_WRITTEN = ("sample_sums", "wide_blocks")  #: arrays of effects that kernels fill
 
 
 def check_buffer(device: Device, size: int, what: str) -> None:
@@ -48,6 +51,7 @@ class Buffers:
     """The device's copy of a packed scene. `shared_lights`: whether edge planes of every light fit in memory."""
 
     def __init__(self, device: Device, packed: Packed, features: Features, precision: Precision) -> None:
+        packed = replace(packed, block=program.block_width(precision.lanes(device.info.lanes)))
         self.device, self.packed, self.features, self.precision = device, packed, features, precision
         self.plane_bytes = max(1, packed.slots) * layout.edge_planes(precision.real).itemsize
         lights = len(packed.scene.lights_with_position)
@@ -57,7 +61,7 @@ class Buffers:
         self.vertices = self.upload(packed.vertices)
         self.core = [self.upload(a) for a in (packed.nodes, packed.indices, packed.objects, packed.surfaces, packed.materials)]
         self.effects = {
-            name: self.upload(np.zeros(0, np.int32) if features.idle(f) else PACKERS[name](packed), writable=name == "sample_sums")
+            name: self.upload(np.zeros(0, np.int32) if features.idle(f) else PACKERS[name](packed), writable=name in _WRITTEN)
             for f in features.active for name, _ in f.parameters if name != "light_planes"
         }
         self.triangles = self.empty(max(1, packed.slots) * layout.triangle(precision.real).itemsize)
@@ -65,6 +69,11 @@ class Buffers:
         with_shadows = any(name == "light_planes" for f in features.active for name, _ in f.parameters)
         if with_shadows:
             self.effects["light_planes"] = self.empty(self.plane_bytes * (max(1, lights) if self.shared_lights else 1))
+
+    @property
+    def wide_stack(self) -> int:
+        """Entries of the stack of wide trees."""
+        return max(program.WIDE_STACK, wide_trees(self.packed).stack) if "single rays" in dict(self.features.lines) else program.WIDE_STACK
 
     @property
     def size(self) -> int:
@@ -105,9 +114,17 @@ class Buffers:
                 kernel(
                     queue, part, (PREPARE_LOCAL,), self.vertices, _double4(origin), self.triangles, np.int32(end), global_offset=(first,)
                 )
+            if "single rays" in dict(self.features.lines):
+                self._prepare_blocks(cl.Kernel(built, "prepare_blocks"))
             if planes:
                 self._prepare_planes(cl.Kernel(built, "prepare_planes"), size, count)
             queue.finish()
+
+    def _prepare_blocks(self, kernel: Any) -> None:
+        slots = wide_trees(self.packed).slots
+        size = (multiple(slots.size, PREPARE_LOCAL),)
+        given = self.upload(slots)
+        kernel(self.device.queue, size, (PREPARE_LOCAL,), self.triangles, given, self.effects["wide_blocks"], np.int32(slots.size))
 
     def _prepare_planes(self, kernel: Any, size: tuple[int], count: np.int32) -> None:
         packed, queue, local = self.packed, self.device.queue, (PREPARE_LOCAL,)
