@@ -49,6 +49,7 @@ def test_lamp_of_more_than_half_a_turn_has_the_profile_of_its_cone(softness: flo
     np.testing.assert_allclose(pixels[..., 0], expected, atol=2e-6)
 
 
+@pytest.mark.slow
 def test_whole_turn_without_softness_is_a_point_light() -> None:
     turned = clrt.render(parse_scene(BODIES + "spot 1 4 -1  0 1 0  360\n")).pixels
     assert np.array_equal(turned, clrt.render(parse_scene(BODIES + "L 1 4 -1\n")).pixels)
