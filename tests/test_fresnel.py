@@ -46,7 +46,7 @@ def slab(angle: float, depth: int, ior: float = 1.5, total: float = 1.0) -> tupl
 
 
 @pytest.mark.parametrize("angle", [0.0, math.pi / 4, math.atan(1.5)], ids=["normal", "45 degrees", "Brewster"])
-@pytest.mark.parametrize("depth", [1, pytest.param(2, marks=pytest.mark.slow), 5])
+@pytest.mark.parametrize("depth", [1, 2, 5])
 def test_slab_sums_its_reflections_up_to_the_depth(device: Device, angle: float, depth: int) -> None:
     """Each order of reflection inside comes out after one surface more: F, then T^2, T^2 F, T^2 F^2..."""
     f = share(angle, 1.0, 1.5)
