@@ -20,6 +20,7 @@ from clrt.device.blocks import WideArrays, wide_arrays
 from clrt.device.context import open_device
 from clrt.device.pack import local_origin, pack
 from clrt.device.packed import Packed
+from clrt.device.prepare import prepare
 from clrt.device.ray_sort import FEWEST, RaySorter, in_order_already
 from clrt.device.session import Buffers, StageCounter
 from clrt.features import Features
@@ -71,10 +72,10 @@ class RayCaster:
         self._packed = pack(scene, self.trees, features, self.precision)
         width = max(4, self.precision.lanes(self._device.info.lanes))
         wide = wide_arrays(self._packed, self.trees, width)
-        shape = program.Shape(wide.stack, block=width)
+        shape = program.Shape(0, block=width, wide=wide.stack)
         built = program.build(self._device, program.compose(features, self.precision, 1, shape, entry="cast"))
         self._buffers = Buffers(self._device, self._packed, features, self.precision)
-        self._buffers.prepare(built, planes=False)
+        prepare(self._buffers, built, planes=False)
         self._upload_wide(built, wide)
         self._stages: StageCounter | None = None
         self._sources = self._buffers.upload(_sources(self.scene, self._packed))

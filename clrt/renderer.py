@@ -16,6 +16,7 @@ from clrt.device import ahead, kernel_cache, program
 from clrt.device.ahead import Compilation
 from clrt.device.context import Device, open_device
 from clrt.device.pack import pack, tree_origins
+from clrt.device.prepare import prepare
 from clrt.device.session import Buffers, Tracer, check_picture, shares_lights
 from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
@@ -189,13 +190,16 @@ def build_trees(scene: Scene, tree: str, tell: Progress, device: Device | None =
     return Prepared(scene, tuple(trees), tuple(seconds))
 
 
-def program_shape(prepared: Prepared, features: Features, shared_lights: bool) -> program.Shape:
+def program_shape(prepared: Prepared, features: Features, shared_lights: bool, wide: int = program.WIDE_STACK) -> program.Shape:
     """The sizes that the program of these features is compiled for: trees as deep as they may become, so that they need not be there."""
     bounces = any(f.name == "bounce" for f in features.active)
     scene = prepared.scene
     deepest = max([default_max_depth(len(o)) for o in scene.objects] + [t.depth for t in prepared.trees], default=0)
     boxes = depth_limit(len(scene.objects) + placement_count(scene) + len(scene.spheres))
-    return program.Shape(program.stack_size(deepest), scene.depth if bounces else 0, shared_lights, program.stack_size(boxes))
+    return program.Shape(
+        program.stack_size(deepest), scene.depth if bounces else 0, shared_lights, program.stack_size(boxes), wide=wide,
+        groups=program.groups_pay(features, scene.triangle_count),
+    )  # fmt: skip
 
 
 def _as_called(prepared: Prepared, features: Features) -> Prepared:
@@ -211,9 +215,11 @@ def fill_buffers(prepared: Prepared, features: Features, precision: Precision, d
     lanes = precision.lanes(device.info.lanes)
     program.check_limits(precision, lanes, program_shape(prepared, features, True), features)
     start = time.perf_counter()
-    buffers = Buffers(device, pack(prepared.scene, prepared.trees, features, precision), features, precision)
+    packed = pack(prepared.scene, prepared.trees, features, precision)
+    buffers = Buffers(device, packed, features, precision, program.groups_pay(features, prepared.scene.triangle_count))
     upload_s = time.perf_counter() - start
-    return buffers, program.compose(features, precision, lanes, program_shape(prepared, features, buffers.shared_lights)), upload_s
+    shape = program_shape(prepared, features, buffers.shared_lights, buffers.wide_stack)
+    return buffers, program.compose(features, precision, lanes, shape), upload_s
 
 
 def _begin_program(scene: Scene, features: Features, precision: Precision, device: Device) -> Compilation:
@@ -239,7 +245,7 @@ def open_tracer(
     tracer.warm_up()
     tell("compile", 1.0)
     start = time.perf_counter()
-    buffers.prepare(built)
+    prepare(buffers, built)
     return buffers, tracer, source, upload_s + time.perf_counter() - start
 
 
@@ -248,7 +254,8 @@ def run_rows(tracer: Tracer, phase: str, tell: Progress) -> None:
     scene = tracer.buffers.packed.scene
     bounces = any(f.name == "bounce" for f in tracer.buffers.features.active)
     rays_a_pixel = (1 + len(scene.lights_with_position) + len(scene.suns)) * (1 + (2 * scene.depth if bounces else 0))
-    rows = max(8, _FIRST_LAUNCH // (rays_a_pixel * tracer.width) // 8 * 8)
+    high = tracer.row_step
+    rows = max(high, _FIRST_LAUNCH // (rays_a_pixel * tracer.width) // high * high)
     sampled = "sampling" in {f.name for f in tracer.buffers.features.active}
     count = passes(scene, tracer.buffers.features)
     for sample in range(count):
@@ -261,7 +268,7 @@ def run_rows(tracer: Tracer, phase: str, tell: Progress) -> None:
             start = time.perf_counter()
             tracer.run(row, end)
             pace = (time.perf_counter() - start) / (end - row)
-            rows = max(8, min(8 * rows, int(_LAUNCH_S / max(pace, 1e-9)))) // 8 * 8
+            rows = max(high, min(8 * rows, int(_LAUNCH_S / max(pace, 1e-9))) // high * high)
             row = end
     tell(phase, 1.0)
 
@@ -280,7 +287,7 @@ def _count(prepared: Prepared, buffers: Buffers, stats: RunStats, tell: Progress
     """The same picture again by the counting build, by the same launches if it was made of replicates: rays by kind, tests by object."""
     precision, device = buffers.precision, buffers.device
     lanes = precision.lanes(device.info.lanes)
-    shape = program_shape(_as_called(prepared, buffers.features), buffers.features, buffers.shared_lights)
+    shape = program_shape(_as_called(prepared, buffers.features), buffers.features, buffers.shared_lights, buffers.wide_stack)
     tracer = Tracer(
         buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True
     )

@@ -41,3 +41,6 @@
             hit = order > 0 || (order == 0 && geometry->surfaces[slot].prim > geometry->surfaces[last[k]].prim);
         }
 //@end
+//@hook block_alone
+    alone = alone && lane_of_mask(rays->after, k) < 0;
+//@end

@@ -1,7 +1,7 @@
-// Provides: scene_trace: one ray through the wide trees of all objects, for the closest or for any hit; kernels
+// Provides: blocks_trace: one ray of a packet through the wide tree of an object, for the closest or for any hit; kernels
 //           prepare_blocks and prepare_boxes.
-// Needs: lanes.cl (LANES 1), rays.cl, given.cl, structs, geometry.cl, one triangle_*.cl.  Reads: BLOCK (16, 8 or 4), STACK_SIZE (at least
-// the depth of the deepest wide tree).
+// Needs: lanes.cl, rays.cl, structs, geometry.cl, one triangle_*.cl.  Reads: BLOCK (16, 8 or 4), WIDE_STACK (at least the depth of the
+// deepest wide tree).
 //
 // A vector holds one number of all children of a node, or of all triangles of a block. What is left out of a block is what triangle_test would
 // refuse; a lone triangle that it would surely accept is; all else goes through it one by one.
@@ -36,6 +36,10 @@ HOT uint block_bits(block_mask m) {
 #define lowest_bit(bits) (31 - (int)clz((bits) & -(bits)))
 #endif
 
+// The number of lane `k`, of a ray among others or of one alone.
+#define lane_of(numbers, k) (((real *)&(numbers))[k])
+#define lane_of_mask(numbers, k) (((lane_int *)&(numbers))[k])
+
 // New bounds come first: where one is NaN (beyond the range of `real`), the old one stays.
 HOT block_n min_block(block_n a, block_n b) { return (a < b) ? a : b; }
 HOT block_n max_block(block_n a, block_n b) { return (a > b) ? a : b; }
@@ -50,15 +54,18 @@ typedef struct {
     int order_shift;  // of the ray's octant, in `order`
 } WideRay;
 
-HOT real wide_ray(global const Object *object, const Rays *rays, WideRay *ray) {
-    const real reach = rays_reach(rays, object), pad = (R(8.0) * UNIT_ROUNDOFF) * reach;
-    ray->order_shift = 4 * (int)rays->octant;
+HOT real wide_ray(global const Object *object, const Rays *rays, int k, WideRay *ray) {
+    real reach = object->extent;
+    for (int a = 0; a < 3; a++) reach += fabs(lane_of(rays->origin[a], k));
+    const real pad = (R(8.0) * UNIT_ROUNDOFF) * reach;
+    const int octant = (int)lane_of_mask(rays->octant, k);
+    ray->order_shift = 4 * octant;
     for (int a = 0; a < 3; a++) {
-        const real slab = pad * abs_n(rays->inverse[a]), away = -(rays->origin[a] * rays->inverse[a]);
-        ray->inverse[a] = rays->inverse[a];
+        const real inverse = lane_of(rays->inverse[a], k), slab = pad * fabs(inverse), away = -(lane_of(rays->origin[a], k) * inverse);
+        ray->inverse[a] = inverse;
         ray->enter_shift[a] = away - slab;
         ray->leave_shift[a] = away + slab;
-        ray->enter[a] = 2 * a + (((int)rays->octant >> a) & 1);
+        ray->enter[a] = 2 * a + ((octant >> a) & 1);
     }
     return reach;
 }
@@ -92,14 +99,14 @@ HOT uint children_in_order(global const WideNode *node, int order_shift, block_n
 // Children of a node that the ray may meet before t_max.
 HOT uint node_children(global const WideNode *node, const WideRay *ray, real t_min, real t_max, block_n *distance, block_int *child) {
 #pragma OPENCL FP_CONTRACT ON
-#define row(n) load_block(node->planes[n])
-    block_n enter = max_block(row(ray->enter[0]) * ray->inverse[0] + ray->enter_shift[0], (block_n)t_min);
-    block_n leave = min_block(row(ray->enter[0] ^ 1) * ray->inverse[0] + ray->leave_shift[0], (block_n)t_max);
-    enter = max_block(row(ray->enter[1]) * ray->inverse[1] + ray->enter_shift[1], enter);
-    leave = min_block(row(ray->enter[1] ^ 1) * ray->inverse[1] + ray->leave_shift[1], leave);
-    enter = max_block(row(ray->enter[2]) * ray->inverse[2] + ray->enter_shift[2], enter);
-    leave = min_block(row(ray->enter[2] ^ 1) * ray->inverse[2] + ray->leave_shift[2], leave);
-#undef row
+#define node_row(n) load_block(node->planes[n])
+    block_n enter = max_block(node_row(ray->enter[0]) * ray->inverse[0] + ray->enter_shift[0], (block_n)t_min);
+    block_n leave = min_block(node_row(ray->enter[0] ^ 1) * ray->inverse[0] + ray->leave_shift[0], (block_n)t_max);
+    enter = max_block(node_row(ray->enter[1]) * ray->inverse[1] + ray->enter_shift[1], enter);
+    leave = min_block(node_row(ray->enter[1] ^ 1) * ray->inverse[1] + ray->leave_shift[1], leave);
+    enter = max_block(node_row(ray->enter[2]) * ray->inverse[2] + ray->enter_shift[2], enter);
+    leave = min_block(node_row(ray->enter[2] ^ 1) * ray->inverse[2] + ray->leave_shift[2], leave);
+#undef node_row
     return children_in_order(node, ray->order_shift, enter, leave, distance, child);
 }
 
@@ -110,14 +117,14 @@ typedef struct {
     block_n t, error;
 } BlockHits;
 
-HOT void block_test(global const Block *block, const Rays *rays, real reach, const Hits *hits, BlockHits *found) {
+HOT void block_test(global const Block *block, const Rays *rays, int k, real reach, const Hits *hits, BlockHits *found) {
 #pragma OPENCL FP_CONTRACT ON
-    const real *d = rays->direction;
+    const real d[3] = {lane_of(rays->direction[0], k), lane_of(rays->direction[1], k), lane_of(rays->direction[2], k)};
     const block_n e10 = load_block(block->e1[0]), e11 = load_block(block->e1[1]), e12 = load_block(block->e1[2]);
     const block_n e20 = load_block(block->e2[0]), e21 = load_block(block->e2[1]), e22 = load_block(block->e2[2]);
-    const block_n t0 = rays->origin[0] - load_block(block->v0[0]);
-    const block_n t1 = rays->origin[1] - load_block(block->v0[1]);
-    const block_n t2 = rays->origin[2] - load_block(block->v0[2]);
+    const block_n t0 = lane_of(rays->origin[0], k) - load_block(block->v0[0]);
+    const block_n t1 = lane_of(rays->origin[1], k) - load_block(block->v0[1]);
+    const block_n t2 = lane_of(rays->origin[2], k) - load_block(block->v0[2]);
     const block_n p0 = d[1] * e22 - d[2] * e21, p1 = d[2] * e20 - d[0] * e22, p2 = d[0] * e21 - d[1] * e20;
     const block_n q0 = t1 * e12 - t2 * e11, q1 = t2 * e10 - t0 * e12, q2 = t0 * e11 - t1 * e10;
     const block_n u = t0 * p0 + t1 * p1 + t2 * p2;
@@ -133,7 +140,7 @@ HOT void block_test(global const Block *block, const Rays *rays, real reach, con
     const block_n t = offset * inverse;
     const block_n error = (abs_block(t) * normal_bound + reach * normal_bound) * abs_block(R(2.0) * inverse);
     const block_mask grazing = abs_block(rate) <= R(2.0) * normal_bound;
-    const block_mask outside = (t + error < rays->t_min) | (t - error > hits->t);
+    const block_mask outside = (t + error < lane_of(rays->t_min, k)) | (t - error > lane_of(hits->t, k));
     found->possible &= block_bits(grazing | ~outside);
     const block_mask clear = ((lowest > bound) & (highest > R(8.0) * bound)) | ((highest < -bound) & (lowest < R(-8.0) * bound));
     //@ block_limits
@@ -143,24 +150,30 @@ HOT void block_test(global const Block *block, const Rays *rays, real reach, con
 }
 
 // One by one. Rare, so kept out of the loops' registers, and out of their text.
-static __attribute__((noinline)) void block_unsure(const Geometry *geometry, global const Block *block, const Rays *rays, real reach, uint bits,
+static __attribute__((noinline)) void block_unsure(const Geometry *geometry, global const Block *block, const Rays *rays, int k, real reach, uint bits,
                                                    Hits *hits) {
-    for (; bits; bits &= bits - 1) triangle_test(geometry, rays, reach, block->slot[lowest_bit(bits)], 0, ALL_LANES, hits);
+    lane_int lane[LANES];
+    for (int i = 0; i < LANES; i++) lane[i] = i == k ? -1 : 0;
+    for (; bits; bits &= bits - 1) triangle_test(geometry, rays, (real_n)reach, block->slot[lowest_bit(bits)], 0, load_lanes(lane), hits);
 }
 
-HOT void block_hits(const Geometry *geometry, global const Block *block, const Rays *rays, real reach, Hits *hits) {
+HOT void block_hits(const Geometry *geometry, global const Block *block, const Rays *rays, int k, real reach, Hits *hits) {
     BlockHits found;
-    block_test(block, rays, reach, hits, &found);
+    block_test(block, rays, k, reach, hits, &found);
+    //@ block_tested
+    //@ block_possible
     if (!found.possible) return;
-    if (found.sure != found.possible || (found.sure & (found.sure - 1)) || rays->after >= 0) {
-        block_unsure(geometry, block, rays, reach, found.possible, hits);
+    int alone = found.sure == found.possible && !(found.sure & (found.sure - 1));
+    //@ block_alone
+    if (!alone) {
+        block_unsure(geometry, block, rays, k, reach, found.possible, hits);
         return;
     }
-    const int lane = lowest_bit(found.sure);
+    const int place = lowest_bit(found.sure);
     real t[BLOCK], error[BLOCK];
     PASTE(vstore, BLOCK)(found.t, 0, t);
     PASTE(vstore, BLOCK)(found.error, 0, error);
-    hits->slot = block->slot[lane];
+    lane_of_mask(hits->slot, k) = block->slot[place];
     //@ block_accept
 }
 
@@ -180,30 +193,26 @@ HOT int next_child(const block_n *distances, const block_int *children, uint *pe
     return 1;
 }
 
-HOT void blocks_trace(const Geometry *geometry, global const Object *object, const Rays *rays, const int any_hit, Hits *hits) {
+// Ray k through the wide tree of an object, which begins at `node`.
+HOT void blocks_trace(const Geometry *geometry, global const Object *object, int node, const Rays *rays, int k, const int any_hit,
+                      Hits *hits) {
     WideRay ray;
-    const real reach = wide_ray(object, rays, &ray);
+    const real reach = wide_ray(object, rays, k, &ray);
     // Nodes with children left to see: which, and their distances.
-    block_n distances[STACK_SIZE];
-    block_int children[STACK_SIZE];
-    uint pending[STACK_SIZE];
-    int level = 0, node = object->root;
+    block_n distances[WIDE_STACK];
+    block_int children[WIDE_STACK];
+    uint pending[WIDE_STACK];
+    int level = 0;
     for (;;) {
         if (node >= 0) {
-            pending[level] = node_children(geometry->wide + node, &ray, rays->t_min, hits->t, distances + level, children + level);
+            const real t_min = lane_of(rays->t_min, k), t_max = lane_of(hits->t, k);
+            pending[level] = node_children(geometry->wide + node, &ray, t_min, t_max, distances + level, children + level);
             level += pending[level] != 0;
         } else {
-            block_hits(geometry, geometry->blocks + (-1 - node), rays, reach, hits);
-            if (any_hit && hits->slot >= 0) return;
+            block_hits(geometry, geometry->blocks + (-1 - node), rays, k, reach, hits);
+            if (any_hit && lane_of_mask(hits->slot, k) >= 0) return;
         }
-        if (!next_child(distances, children, pending, hits->t, &level, &node)) return;
-    }
-}
-
-HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int shared_origin, const int any_hit, Hits *hits) {
-    for (int b = 0; b < geometry->object_count; b++) {
-        blocks_trace(geometry, geometry->objects + b, rays, any_hit, hits);
-        if (any_hit && hits->slot >= 0) return;
+        if (!next_child(distances, children, pending, lane_of(hits->t, k), &level, &node)) return;
     }
 }
 
@@ -239,8 +248,8 @@ kernel void prepare_boxes(global const WideNode *wide, global Block *blocks, int
     global const Block *blocks;
 //@end
 //@hook block_limits_default
-    const real after = rays->t_min, before = hits->t;
+    const real after = lane_of(rays->t_min, k), before = lane_of(hits->t, k);
 //@end
 //@hook block_accept_default
-    hits->t = t[lane];
+    lane_of(hits->t, k) = t[place];
 //@end

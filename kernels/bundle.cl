@@ -65,7 +65,7 @@ HOT void bundle_begin(global const Object *object, const Rays *rays, const Hits 
     for (int i = 0; i < RUN; i++) {
         WideRay ray;
         const int from = i < count ? i : 0;
-        all->reach[i] = wide_ray(object, rays + from, &ray);
+        all->reach[i] = wide_ray(object, rays + from, 0, &ray);
         for (int a = 0; a < 3; a++) {
             all->inverse[a][i] = ray.inverse[a];
             all->enter_shift[a][i] = ray.enter_shift[a];
@@ -109,7 +109,7 @@ HOT real bundle_block(const Geometry *geometry, global const Block *block, const
     for (int first = 0; first < RUN; first += BLOCK) {
         for (uint bits = bundle_live(block, bundle, all, first); bits; bits &= bits - 1) {
             const int i = first + lowest_bit(bits);
-            block_hits(geometry, block, rays + i, all->reach[i], hits + i);
+            block_hits(geometry, block, rays + i, 0, all->reach[i], hits + i);
             all->t[i] = any_hit && hits[i].slot >= 0 ? (real)-INFINITY : hits[i].t;
         }
         for (int i = first; i < first + BLOCK; i++) t_max = max_n(all->t[i], t_max);
@@ -124,9 +124,9 @@ HOT void bundle_object(const Geometry *geometry, global const Object *object, co
     bundle_begin(object, rays, hits, count, any_hit, &bundle, &all);
     real t_max = (real)-INFINITY;
     for (int i = 0; i < RUN; i++) t_max = max_n(all.t[i], t_max);
-    block_n distances[STACK_SIZE];
-    block_int children[STACK_SIZE];
-    uint pending[STACK_SIZE];
+    block_n distances[WIDE_STACK];
+    block_int children[WIDE_STACK];
+    uint pending[WIDE_STACK];
     int level = 0, node = object->root;
     for (;;) {
         if (node >= 0) {

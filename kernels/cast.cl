@@ -25,13 +25,21 @@ HOT void ray_begin(const GivenRay *ray, int good, const Geometry *geometry, real
     rays_prepare(rays, extent);
 }
 
+// A ray through every object of the mesh, one tree after the other.
+HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
+    for (int b = 0; b < geometry->object_count; b++) {
+        blocks_trace(geometry, geometry->objects + b, geometry->objects[b].root, rays, 0, any_hit, hits);
+        if (any_hit && hits->slot >= 0) return;
+    }
+}
+
 // The first hit of a ray that is traced alone, or any; to count or list, how many there are: one is sought after the other, in the order of t
 // and id, until there is no further one.
 HOT int ray_trace(const Geometry *geometry, Rays *ray, int number, int mode, global const int *begin, global int2 *list, Hits *first) {
     int found = 0;
     while (found <= geometry->slot_count) {
         Hits hits = *first;
-        scene_trace(geometry, ray, 0, mode == ANY_HIT, &hits);
+        scene_trace(geometry, ray, mode == ANY_HIT, &hits);
         if (mode < COUNT_HITS) *first = hits;
         if (mode < COUNT_HITS || hits.slot < 0) break;
         if (mode == LIST_HITS) list[begin[number] + found] = (int2)(hits.slot, number);

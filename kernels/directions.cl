@@ -1,4 +1,4 @@
-// Provides: Directions, least_directions, directions_in_steps, boxes_met, first_bit; kernel prepare_directions: which triangles of a leaf rays
+// Provides: Directions, least_directions, directions_in_steps, boxes_met, first_bit; prepare_directions, prepare_unions: which triangles of a leaf rays
 //           of a shared origin can meet at all.
 // Needs: lanes.cl, rays.cl, triangle.cl, structs.  Reads: BOXES (16).
 //
@@ -70,6 +70,9 @@ HOT uint box_bits(short16 m) {
 #define first_bit(bits) (31 - (int)clz((bits) & -(bits)))
 #endif
 
+#define PREPARE_DIRECTIONS 2
+#define PREPARE_UNIONS 3
+
 // A bit for each of 16 triangles or records whose box meets that of the directions, and which are not all farther away than `far`.
 HOT uint boxes_met(global const DirectionBoxes *boxes, const Directions *all, float far) {
     global const short16 *lo = (global const short16 *)boxes->lo, *hi = (global const short16 *)boxes->hi;
@@ -78,15 +81,13 @@ HOT uint boxes_met(global const DirectionBoxes *boxes, const Directions *all, fl
                            & (lo[2] <= all->hi[2]) & (hi[2] >= all->lo[2]));
 }
 
-// The boxes of one triangle of a block a work-item, from the numbers as given, in float64. Where there is none, the box is one that nothing
+// The boxes of one triangle of a block, from the numbers as given, in float64. Where there is none, the box is one that nothing
 // meets; of a triangle that is large, or on whose corner the origin lies, one that all meet. `near` is no farther than the triangle: the
 // distance to its box along the axes, rounded down.
-kernel void prepare_directions(global const double *vertices, global const int2 *blocks, double4 shared_origin, float4 scale,
-                               global DirectionBoxes *records, int first, int count) {
-    const int block = get_global_id(0) / BOXES, k = get_global_id(0) % BOXES;
-    if (block >= count) return;
-    records += first;
-    if (get_global_id(0) == 0) {
+static inline void prepare_directions(global const double *vertices, global const int2 *blocks, int item, const double *origin, float4 scale,
+                                      global DirectionBoxes *records) {
+    const int block = item / BOXES, k = item % BOXES;
+    if (item == 0) {
         global DirectionScale *head = (global DirectionScale *)records;
         head->middle[0] = scale.x;
         head->middle[1] = scale.y;
@@ -96,7 +97,6 @@ kernel void prepare_directions(global const double *vertices, global const int2 
     const float middle[3] = {scale.x, scale.y, scale.z};
     global DirectionBoxes *box = records + 1 + block;
     const int slot = k < blocks[block].y ? blocks[block].x + k : -1;
-    const double origin[3] = {shared_origin.x, shared_origin.y, shared_origin.z};
     double unit[3][3], square = 0, gap[3];
     int known = slot >= 0;
     for (int c = 0; c < 3 && slot >= 0; c++) {
@@ -145,12 +145,10 @@ kernel void prepare_directions(global const double *vertices, global const int2 
     box->item[k] = slot;
 }
 
-// The boxes of one record a work-item, as an entry of the record above it: `count` records from `below` on, 16 to each from `above` on; of an origin whose first record is `first`.
-kernel void prepare_unions(global DirectionBoxes *records, int first, int below, int above, int count) {
-    const int entry = get_global_id(0), k = entry % BOXES;
-    if (entry >= (count + BOXES - 1) / BOXES * BOXES) return;
-    records += first;
-    global DirectionBoxes *box = records + above + entry / BOXES;
+// The boxes of one record, as an entry of the record above it: `count` records from `below` on, 16 to each behind them.
+static inline void prepare_unions(global DirectionBoxes *records, int entry, int below, int count) {
+    const int k = entry % BOXES;
+    global DirectionBoxes *box = records + below + count + entry / BOXES;
     const int there = entry < count;
     global const DirectionBoxes *of = records + below + (there ? entry : 0);
     for (int a = 0; a < 3; a++) {
@@ -182,4 +180,11 @@ kernel void prepare_unions(global DirectionBoxes *records, int first, int below,
     geometry.boxes = eye_boxes;
     geometry.block_count = block_count;
     geometry.box_count = box_count;
+//@end
+//@hook prepare_parameters
+                    , global const int2 *blocks, float4 scale, global DirectionBoxes *records, int below, int below_count
+//@end
+//@hook prepare
+    if (what == PREPARE_DIRECTIONS) prepare_directions(vertices, blocks, item, origin, scale, records + first);
+    if (what == PREPARE_UNIONS) prepare_unions(records + first, item, below, below_count);
 //@end

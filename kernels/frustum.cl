@@ -104,6 +104,11 @@ HOT real spread_size(const Spread *of) {
     return size;
 }
 
+// A packet that goes alone: one copy for all callers.
+static __attribute__((noinline)) void packet_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
+    scene_trace(geometry, rays, 1, any_hit, hits);
+}
+
 // Rays as scene_trace takes them, with one origin for all that are active. Apart from the callers: they are few, and this is large.
 static __attribute__((noinline)) void group_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
     Spread of[GROUP];
@@ -128,7 +133,7 @@ static __attribute__((noinline)) void group_trace(const Geometry *geometry, cons
         }
         if (all.lo[0] > (real)1.5) continue;
         if (geometry->box_count == 0 || spread_size(&all) > SPREAD) {
-            for (int p = begin; p < begin + count; p++) scene_trace(geometry, rays + p, 1, any_hit, hits + p);
+            for (int p = begin; p < begin + count; p++) packet_trace(geometry, rays + p, any_hit, hits + p);
             continue;
         }
         group.rays = rays + begin;

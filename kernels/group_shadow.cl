@@ -74,3 +74,6 @@ typedef struct {
             lit &= ~known;
         }
 //@end
+//@hook shadow_trace
+    packet_trace(&seen, &rays, 1, &hits);
+//@end

@@ -4,11 +4,13 @@
 // Every computed distance to a plane is widened by its error bound on both sides (see box.cl), and comparisons are written
 // so that a NaN visits both children: a cell is entered if it cannot be shown to be missed (Ize 2013; Havran 2000).
 
+//@ kdtree_before
 HOT void kdtree_trace(const Geometry *geometry, global const Object *object, const Rays *rays, mask_n active, const int shared_origin,
                          const int any_hit, Hits *hits) {
     real_n slab[3], t_enter, t_leave;
     active &= box_clip(object, rays, hits->t, slab, &t_enter, &t_leave);
     if (!any_lane(active)) return;
+    //@ kdtree_rays
     const real_n reach = rays_reach(rays, object);
     PlaneLines lines;
     if (shared_origin) plane_lines(rays, slab, &lines);

@@ -1,4 +1,4 @@
-// Provides: kernels prepare_triangles and prepare_planes: the records that rays test, from the numbers as given.
+// Provides: kernel prepare: the records that rays test, from the numbers as given. One for all of them: PoCL compiles each kernel by itself.
 // Needs: lanes.cl, structs, triangle.cl.  Reads: nothing.
 //
 // All in float64, rounded once to `real`; the bounds are derived in triangle.cl.
@@ -9,10 +9,7 @@ static inline double normal_bound(const double *e1, const double *e2, const doub
     return 8 * UNIT_ROUNDOFF * length_double(normal) + 16 * 0x1p-53 * length_double(e1) * length_double(e2);
 }
 
-kernel void prepare_triangles(global const double *vertices, double4 local_origin, global Triangle *triangles, int count) {
-    const int slot = get_global_id(0);
-    if (slot >= count) return;
-    const double origin[3] = {local_origin.x, local_origin.y, local_origin.z};
+static inline void prepare_triangle(global const double *vertices, int slot, const double *origin, global Triangle *triangles) {
     double e1[3], e2[3], normal[3];
     for (int a = 0; a < 3; a++) {
         const double v0 = vertices[9 * slot + a];
@@ -30,11 +27,7 @@ kernel void prepare_triangles(global const double *vertices, double4 local_origi
     triangles[slot].normal_bound = (real)normal_bound(e1, e2, normal);
 }
 
-kernel void prepare_planes(global const double *vertices, double4 shared_origin, global EdgePlanes *planes, int first, int count) {
-    const int slot = get_global_id(0);
-    if (slot >= count) return;
-    planes += first + slot;
-    const double origin[3] = {shared_origin.x, shared_origin.y, shared_origin.z};
+static inline void prepare_planes(global const double *vertices, int slot, const double *origin, global EdgePlanes *planes) {
     double corner[3][3], e1[3], e2[3], normal[3], edge[3][3], longest = 0, steepest = 0;
     for (int c = 0; c < 3; c++)
         for (int a = 0; a < 3; a++) corner[c][a] = vertices[9 * slot + 3 * c + a] - origin[a];
@@ -57,4 +50,21 @@ kernel void prepare_planes(global const double *vertices, double4 shared_origin,
     planes->bound = (real)(8 * UNIT_ROUNDOFF * steepest + 16 * 0x1p-53 * longest);
     planes->normal_bound = (real)normal_bound(e1, e2, normal);
     planes->offset_bound = (real)(16 * 0x1p-53 * length_double(corner[0]) * length_double(e1) * length_double(e2));
+}
+
+// What is prepared, an item a work-item up to `count`: triangles for rays of any origin, relative to the local one; planes as seen from a
+// shared origin, from record `first` on; what effects add.
+#define PREPARE_TRIANGLES 0
+#define PREPARE_PLANES 1
+
+kernel void prepare(int what, global const double *vertices, double4 given_origin, global Triangle *triangles, global EdgePlanes *planes, int first,
+                    int count
+                    //@ prepare_parameters
+) {
+    const int item = get_global_id(0);
+    if (item >= count) return;
+    const double origin[3] = {given_origin.x, given_origin.y, given_origin.z};
+    if (what == PREPARE_TRIANGLES) prepare_triangle(vertices, item, origin, triangles);
+    if (what == PREPARE_PLANES) prepare_planes(vertices, item, origin, planes + first + item);
+    //@ prepare
 }

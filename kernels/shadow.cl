@@ -51,7 +51,7 @@ HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int i
     Hits hits;
     shadow_rays(geometry, light, hit, lit, &rays, &hits);
     //@ shadow_open
-    scene_trace(&seen, &rays, SHADOW_SHARED_ORIGIN, 1, &hits);
+    //@ shadow_trace
     //@counting count_rays(geometry->counters, COUNT_SHADOW, rays.active);
     //@ shadow_blocked
     return lit & is_less(hits.slot, NO_LANES);

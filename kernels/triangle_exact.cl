@@ -122,9 +122,9 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
     ordered = 1;  // ties are settled triangle by triangle
 //@end
 //@hook block_limits
-    const real after = rays->t_min_high, before = hits->low;
+    const real after = lane_of(rays->t_min_high, k), before = lane_of(hits->low, k);
 //@end
 //@hook block_accept
-    hits->t = t[lane] + error[lane];
-    hits->low = t[lane] - error[lane];
+    lane_of(hits->t, k) = t[place] + error[place];
+    lane_of(hits->low, k) = t[place] - error[place];
 //@end

@@ -14,3 +14,6 @@
 //@hook light_origin
             if (HAVE_WIDE_EYE) from_eye = 0;
 //@end
+//@hook single_begin
+    geometry.looked_at = HAVE_WIDE_EYE;
+//@end

@@ -132,7 +132,7 @@ def test_every_rung_matches_the_reference(device: Device, precision: str) -> Non
     matches_the_reference(parse_scene(NESTED), precision, device)
 
 
-@pytest.mark.matrix(keep=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_the_reference(lanes: int) -> None:
     opened = open_device()

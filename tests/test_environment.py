@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from device_pictures import in_packets
 
 import clrt
 from clrt import renderer
@@ -238,6 +239,7 @@ def test_ball_in_a_uniform_environment_shows_its_colour(shape: tuple[int, int]) 
     assert_mean(seeds(scene, 32, 24), np.broadcast_to([0.2, 0.8, 1.2], (8, 8, 3)))
 
 
+@pytest.mark.slow
 def test_highlight_in_a_uniform_environment_is_its_integral() -> None:
     """Met square-on, the integral of Ks (R.V)^n / pi is 2 Ks / (n + 1): all of the lobe is above the surface."""
     text = "E 0 0 0\nV 0 0 1\nF 1e-3\nR 4 4\nM 0.5 1 0.75  0 0 0.6 8  0\nT -9 -9 5 9 -9 5 0 9 5\n"
@@ -289,7 +291,7 @@ def test_picture_agrees_with_the_path_tracer(text: str, changes: dict[str, Any])
     assert verdict.accepted, verdict.worst
 
 
-@pytest.mark.matrix(keep=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["fast", "exact"])
 def test_every_rung_gives_the_same_mean(precision: str) -> None:
     scene = lit(CAMERA.replace("R 40 32", "R 10 8") + MATT, spiky(3, 5, seed=9) + 0.05, samples=128)
@@ -343,10 +345,7 @@ def test_picture_does_not_depend_on_launches(device: Device) -> None:
 @pytest.mark.parametrize("lanes", [8, 4, 1])
 def test_every_packet_width_takes_the_same_samples(device: Device, lanes: int) -> None:
     scene = lit(CAMERA + MATT, spiky(8, 16), samples=2)
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
-    tracer = renderer.open_tracer(renderer.build_trees(scene, "sah", quiet), Features.of(scene), rung("watertight"), narrow, quiet)[1]
-    renderer.run_rows(tracer, "render", quiet)
-    off = np.abs(tracer.picture() - clrt.render(scene).pixels).max(-1)
+    off = np.abs(in_packets(scene, device, lanes) - clrt.render(scene).pixels).max(-1)
     assert (off > 1e-4).mean() < 0.01
 
 

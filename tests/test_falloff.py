@@ -49,6 +49,7 @@ def test_lamp_of_more_than_half_a_turn_has_the_profile_of_its_cone(softness: flo
     np.testing.assert_allclose(pixels[..., 0], expected, atol=2e-6)
 
 
+@pytest.mark.slow
 def test_whole_turn_without_softness_is_a_point_light() -> None:
     turned = clrt.render(parse_scene(BODIES + "spot 1 4 -1  0 1 0  360\n")).pixels
     assert np.array_equal(turned, clrt.render(parse_scene(BODIES + "L 1 4 -1\n")).pixels)
@@ -58,7 +59,7 @@ ONE = "spot -2 3 1  2 -3.2 1.7  50 softness=0.6 falloff=yes intensity=20\n"
 SEVERAL = "spot -1 2 1  0 0 1  360 falloff=yes intensity=5\nL 5 5 -5 0.2 0.2 0.2\nsun 1 3 -1 intensity=0.2\n"
 
 
-@pytest.mark.parametrize("lamp", [ONE, SEVERAL])
+@pytest.mark.parametrize("lamp", [pytest.param(ONE, marks=pytest.mark.slow), SEVERAL])
 def test_picture_matches_reference(lamp: str) -> None:
     scene = parse_scene(BODIES + lamp)
     pixels, reference = clrt.render(scene).pixels, render(scene)

@@ -58,7 +58,7 @@ def test_airlight_of_a_lamp_is_its_integral(asymmetry: float) -> None:
     assert abs(batches.mean() - expected) < 4.0 * error
 
 
-@pytest.mark.matrix(keep=2)
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("lamp", LAMPS)
 @pytest.mark.parametrize("fog", ["fog 0.3 red=0.9 asymmetry=0.4\n", "fog 0.3 green=0.6\nindirect\ndepth 2\n"])
 def test_foggy_room_is_that_of_the_reference(lamp: str, fog: str) -> None:
@@ -104,6 +104,7 @@ def test_no_density_is_no_fog() -> None:
     assert "fog" not in Features.of(parse_scene(ROOM + "fog 0\n")).effects
 
 
+@pytest.mark.slow
 def test_scene_in_other_units_is_the_same() -> None:
     scene = parse_scene(ROOM + "L 0.5 1.8 -0.5\nfog 0.3\n")
     np.testing.assert_allclose(clrt.render(scaled(scene, 30), samples=4).pixels, clrt.render(scene, samples=4).pixels, rtol=1e-4)

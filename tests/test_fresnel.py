@@ -97,7 +97,7 @@ def test_total_reflection_reflects_all(device: Device) -> None:
     assert clrt.render(s).pixels[0, 0, 0] == pytest.approx(expected, rel=1e-6)
 
 
-@pytest.mark.matrix(keep=2)
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("depth", [1, 2, 4, 9])
 def test_white_furnace_lacks_only_what_the_depth_cuts_off(device: Device, depth: int) -> None:
     """A ball meets every ray inside at one angle: all but T F^(depth - 1) of the energy has left it."""
@@ -120,13 +120,13 @@ NESTED = (
 )
 
 
-@pytest.mark.matrix(keep=2)
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 def test_nested_and_smooth_glass_matches_the_reference(device: Device, precision: str) -> None:
     picture_matches(parse_scene(NESTED), precision)
 
 
-@pytest.mark.matrix(keep=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_the_reference(device: Device, lanes: int) -> None:
     picture_matches(parse_scene(NESTED), "watertight", replace(device, info=replace(device.info, lanes=lanes)))

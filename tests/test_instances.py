@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import PIL.Image as PillowImage
 import pytest
+from device_pictures import in_packets
 
 import clrt
 import clrt.reference
@@ -129,11 +129,8 @@ def test_every_rung_matches_the_reference(precision: str) -> None:
 @pytest.mark.parametrize("lanes", _slow((16, 8, 4, 1), (4,)))
 def test_every_packet_width_matches_the_reference(device: Device, lanes: int) -> None:
     scene = parse_scene(SCENES["smooth"]).with_size(37, 29)
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
     reference = clrt.reference.render(scene)
-    tracer = _tracer(scene, narrow)
-    renderer.run_rows(tracer, "render", _quiet)
-    _compare(scene, tracer.picture(), reference.margin, reference.pixels, BOUND)
+    _compare(scene, in_packets(scene, device, lanes), reference.margin, reference.pixels, BOUND)
 
 
 def test_textures_and_shining_triangles_go_with_the_instance() -> None:

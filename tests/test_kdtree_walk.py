@@ -126,9 +126,9 @@ def test_real_scene_builds_within_its_time(shared_scene) -> None:  # type: ignor
     vertices = read_objects(shared_scene("rabbit.txt"))[0]
     seconds = []
     for _ in range(5):
-        start = time.perf_counter()
+        start = time.process_time()
         build_tree(vertices)
-        seconds.append(time.perf_counter() - start)
+        seconds.append(time.process_time() - start)
     assert min(seconds) < 0.6
 
 
@@ -136,9 +136,9 @@ def test_real_scene_builds_within_its_time(shared_scene) -> None:  # type: ignor
 def test_million_triangles_build_within_their_time() -> None:
     vertices = sphere(710)
     assert len(vertices) > 1_000_000
-    start = time.perf_counter()
+    start = time.process_time()
     tree = build_tree(vertices)
-    assert time.perf_counter() - start < 10
+    assert time.process_time() - start < 10
     assert tree.reference_count < 4 * len(vertices)
     rays = np.random.default_rng(15).integers(0, len(vertices), 200)
     origin = np.tile([0.3, -0.2, 0.1], (200, 1))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from device_pictures import in_packets
 
 import clrt
 from clrt.device import program
@@ -17,7 +18,6 @@ from clrt.errors import SceneError
 from clrt.features import Features
 from clrt.precision import RUNGS, rung
 from clrt.reference.sampled import SampledPicture, at_time, render_samples, sample_times
-from clrt.renderer import build_trees, open_tracer, run_rows
 from clrt.scene.build import parse_scene
 from clrt.scene.model import Scene
 from clrt.scene.scale import scaled
@@ -64,11 +64,7 @@ def _agrees(pixels: np.ndarray, reference: SampledPicture, precision: str = "wat
     assert wrong.sum() <= 1
 
 
-def _quiet(phase: str, fraction: float) -> None:
-    """No progress."""
-
-
-@pytest.mark.matrix(keep=3)
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize("name", SCENES)
 def test_samples_match_the_reference(name: str) -> None:
     scene, reference = _seen(name, 24)
@@ -83,16 +79,14 @@ def test_rungs_match_the_reference(name: str, precision: str) -> None:
     _agrees(clrt.render(scene, samples=1, precision=precision, seed=7).pixels, reference, precision)
 
 
-@pytest.mark.matrix(keep=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_the_reference(device: Device, lanes: int) -> None:
     scene, reference = _seen("smooth", 24)
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
-    tracer = open_tracer(build_trees(scene, "sah", _quiet), Features.of(scene), rung("watertight"), narrow, _quiet)[1]
-    run_rows(tracer, "render", _quiet)
-    _agrees(tracer.picture(), reference)
+    _agrees(in_packets(scene, device, lanes), reference)
 
 
+@pytest.mark.slow
 def test_samples_are_averaged() -> None:
     scene = replace(parse_scene(FLAT).with_size(6, 5), samples=3)
     _agrees(clrt.render(scene, seed=9).pixels, render_samples(scene, seed=9, bits=24))
@@ -142,12 +136,13 @@ def test_late_times_lose_no_more_than_their_distance_rounds() -> None:
     text = FLAT.replace("shutter 0.25 1", "shutter 10000 10000").replace("move 0.5 0.3 0.2", "move 0.5 0 0")
     moving = parse_scene(text.replace("-1 -1 0 1 -1 0 0 1 0.2", "-5001 -1 0 -4999 -1 0 -5000 1 0.2")).with_size(23, 19)
     fast, sure = (clrt.render(moving, samples=1, precision=precision).pixels for precision in ("fast", "watertight"))
-    still = clrt.render(at_time(moving, 1e4), samples=1, precision="double").pixels
+    still = render_samples(replace(at_time(moving, 1e4), samples=1, shutter=None), seed=moving.seed, bits=24).pixels
     assert (np.abs(fast - still).max(-1) > 0.01).sum() <= 2, "pixels whose centre lies within 5e-4 of an edge"
     # Its edges are 64u times their reach wide there, 64 * 2^-24 * 5000 * 2 = 0.04 units of 0.1 a pixel.
     assert (np.abs(sure - still).max(-1) <= 0.01).mean() > 0.95
 
 
+@pytest.mark.slow
 def test_units_do_not_matter() -> None:
     scene = parse_scene(EYE)
     pixels = clrt.render(scene, samples=2).pixels

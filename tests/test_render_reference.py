@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from device_pictures import in_packets
 
 import clrt.reference
 from clrt import renderer
@@ -81,7 +82,7 @@ def test_every_rung_matches_reference(precision: str) -> None:
     _compare(scene, clrt.render(scene, precision=precision).pixels)
 
 
-@pytest.mark.parametrize("tree", ["sah", "median"])
+@pytest.mark.parametrize("tree", ["sah", pytest.param("median", marks=pytest.mark.slow)])
 def test_monkey_matches_reference(shared_scene: object, tree: str) -> None:
     scene = load_scene(shared_scene("monkey.txt")).with_size(128, 128)  # type: ignore[operator]
     _compare(scene, clrt.render(scene, tree=tree).pixels)
@@ -101,10 +102,7 @@ def test_rabbit_like_mesh_matches_reference() -> None:
 def test_every_packet_width_gives_the_same_picture(device: Device, lanes: int) -> None:
     """Widths differ only in how operations are fused, so pictures agree but for pixels at an edge."""
     scene = parse_scene(SCENES["glass in glass"]).with_size(61, 47)
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
-    tracer = renderer.open_tracer(renderer.build_trees(scene, "sah", _quiet), Features.of(scene), rung("watertight"), narrow, _quiet)[1]
-    renderer.run_rows(tracer, "render", _quiet)
-    _compare(scene, tracer.picture())
+    _compare(scene, in_packets(scene, device, lanes))
 
 
 def test_picture_does_not_depend_on_launches(device: Device) -> None:

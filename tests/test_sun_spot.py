@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from device_pictures import in_packets
 from reference_scenes import globe
 
 import clrt
-from clrt import renderer
 from clrt.device import program
 from clrt.device.context import Device
 from clrt.device.program import Shape
@@ -85,18 +84,11 @@ def test_every_rung_matches_reference(precision: str, body: str) -> None:
     _compare(clrt.render(scene, precision=precision).pixels, reference)
 
 
-@pytest.mark.matrix(keep=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [16, 8, 4, 1])
 def test_every_packet_width_matches_reference(device: Device, lanes: int) -> None:
     scene, reference = _reference("balls", "all")
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
-    tracer = renderer.open_tracer(renderer.build_trees(scene, "sah", _quiet), Features.of(scene), rung("watertight"), narrow, _quiet)[1]
-    renderer.run_rows(tracer, "render", _quiet)
-    _compare(tracer.picture(), reference)
-
-
-def _quiet(phase: str, fraction: float) -> None:
-    pass
+    _compare(in_packets(scene, device, lanes), reference)
 
 
 # Closed forms
@@ -135,7 +127,7 @@ def test_spot_on_a_wall_has_the_profile_of_its_cone(angle: float, softness: floa
     np.testing.assert_allclose(pixels[away], np.repeat(expected[away][:, None], 3, axis=1), rtol=0, atol=BOUND)
 
 
-@pytest.mark.parametrize("precision", sorted(RUNGS))
+@pytest.mark.parametrize("precision", ["exact", "watertight", *(pytest.param(name, marks=pytest.mark.slow) for name in ("double", "fast"))])
 def test_square_throws_a_square_shadow_in_the_sun(precision: str) -> None:
     """A square |x|, |y| <= 0.3 at z = 1, hidden from the eye by none, seen from (1, 0, -1): on the wall the shadow is shifted by -1."""
     square = "T -0.3 -0.3 1 -0.3 0.3 1 0.3 0.3 1\nT -0.3 -0.3 1 0.3 0.3 1 0.3 -0.3 1\nO\n"
@@ -145,7 +137,7 @@ def test_square_throws_a_square_shadow_in_the_sun(precision: str) -> None:
     np.testing.assert_allclose(pixels, np.where(shadow, 0.0, math.sqrt(0.5)), rtol=0, atol=2e-7)
 
 
-@pytest.mark.parametrize("precision", sorted(RUNGS))
+@pytest.mark.parametrize("precision", ["exact", "watertight", *(pytest.param(name, marks=pytest.mark.slow) for name in ("double", "fast"))])
 def test_wall_of_a_room_is_dark_where_the_sun_is_outside(precision: str) -> None:
     """The inner wall of a sphere faces the sun through the far wall, at grazing angles, too."""
     scene = parse_scene("E 0 0 0\nV 0 0 1\nF 100\nR 48 48\n" + WHITE + "S 0 0 0 1\nsun 0 0 1\nsun 0 1 -1e-3\n")
@@ -159,6 +151,7 @@ def test_spot_without_edge_is_a_point_light() -> None:
     assert np.array_equal(spot, clrt.render(parse_scene(body + "L 1 9 -1\n")).pixels)
 
 
+@pytest.mark.slow
 def test_far_point_light_is_a_sun() -> None:
     body = CAMERA + BODIES["balls"]
     near, far = (clrt.render(parse_scene(body + line), precision="double").pixels for line in ("sun 2 3 -1\n", "L 2e7 3e7 -1e7\n"))

@@ -187,7 +187,8 @@ def test_hollow_mesh_is_lit_from_within(light: Vector) -> None:
 
 
 @pytest.mark.parametrize(("wall", "precision"), [("sphere", "watertight"), ("sphere", "exact"), ("thick sphere", "fast"),
-                                                 ("rounded box", "watertight"), ("rounded box", "exact")])  # fmt: skip
+                                                 ("rounded box", "watertight"),
+                                                 pytest.param("rounded box", "exact", marks=pytest.mark.slow)])  # fmt: skip
 def test_no_light_enters_a_closed_mesh(wall: str, precision: str) -> None:
     """The inside of closed shells, lit from outside: dark in every pixel, though N.L > 0 holds for many."""
     if wall == "rounded box":

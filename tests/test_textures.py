@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from device_pictures import Write, in_packets, writer
 from PIL import Image
 
 import clrt
-from clrt import renderer
 from clrt.device.context import Device
 from clrt.errors import SceneError
 from clrt.features import Features
-from clrt.precision import RUNGS, rung
+from clrt.precision import RUNGS
 from clrt.reference import render as reference
 from clrt.scene.build import load_scene
 from clrt.scene.model import Scene
@@ -31,8 +29,6 @@ THINGS = (
 SQUARE = "T -1 -1 2 1 -1 2 1 1 2\nuv 0 0 1 0 1 1\nT -1 -1 2 1 1 2 -1 1 2\nuv 0 0 1 1 0 1\n"
 FACING = "E 0 0 0\nV 0 0 1\nF 90\nR 32 32\nL 0 0 0\nM 1 1 1 1 0 0 1 0\n"
 
-Write = Callable[..., Scene]
-
 
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
@@ -41,11 +37,7 @@ def write(tmp_path: Path) -> Write:
     Image.fromarray(rng.integers(0, 256, (5, 7, 3), dtype=np.uint8)).save(tmp_path / "eight.png")
     Image.fromarray(rng.integers(0, 65536, (6, 4)).astype(np.uint16)).save(tmp_path / "sixteen.png")
 
-    def scene(text: str, **options: object) -> Scene:
-        (tmp_path / "scene.txt").write_text(text)
-        return load_scene(tmp_path / "scene.txt", **options)  # type: ignore[arg-type]
-
-    return scene
+    return writer(tmp_path)
 
 
 def _compare(scene: Scene, pixels: np.ndarray) -> None:
@@ -69,11 +61,7 @@ def test_picture_matches_reference(write: Write, picture: str, wrap: str, look: 
 @pytest.mark.parametrize(("precision", "lanes"), [*((name, 16) for name in sorted(RUNGS)), ("watertight", 8), ("exact", 4), ("double", 1)])
 def test_every_rung_and_width_matches_reference(write: Write, device: Device, precision: str, lanes: int) -> None:
     scene = write(HEAD + "texture eight.png\n" + THINGS).with_size(32, 32)
-    narrow = replace(device, info=replace(device.info, lanes=lanes))
-    prepared = renderer.build_trees(scene, "sah", _quiet)
-    tracer = renderer.open_tracer(prepared, Features.of(scene), rung(precision), narrow, _quiet)[1]
-    renderer.run_rows(tracer, "render", _quiet)
-    _compare(scene, tracer.picture())
+    _compare(scene, in_packets(scene, device, lanes, precision))
 
 
 def test_two_pictures_and_plain_materials_keep_apart(write: Write) -> None:
@@ -277,7 +265,3 @@ def test_textured_material_without_primitives_calls_for_nothing(write: Write) ->
     plain = HEAD.splitlines()[-1]
     scene = write(HEAD + "texture eight.png\n" + plain + "\nS 0 0 3 1\n")
     assert "textures" not in Features.of(scene).effects
-
-
-def _quiet(phase: str, fraction: float) -> None:
-    pass

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from click.testing import CliRunner
 
 from clrt.cli.main import cli
 from clrt.errors import ClrtError
+from clrt.precision import DEFAULT
 from clrt.verify import case as registry
 from clrt.verify import naive, naive_tree
 from clrt.verify.case import EXACT, Case, Context, Outcome, Result, case
@@ -22,6 +24,7 @@ from clrt.verify.run import LAST_CASE, catalogue, chosen, context_for, failures,
 RAYS = 12_000  #: where the rarest naive failures still show
 CASES = catalogue()
 SLOW = {6, 34, 35, 36, 37, 38, 40, 49, 50, 51, 52, 57, 58}  #: many programs to compile
+ONE_RUNG = {39, 41, 42, 43, 44, 45, 46, 47, 48, 54}  #: a program a rung to compile: the default rung first, all of them in the long run
 
 
 @pytest.fixture(scope="module")
@@ -30,9 +33,12 @@ def context() -> Context:
 
 
 @pytest.mark.parametrize(
-    "hard", [pytest.param(c, id=str(c.number), marks=[pytest.mark.slow] if c.number in SLOW else []) for c in CASES]
+    ("hard", "rungs"),
+    [pytest.param(c, None, id=str(c.number), marks=[pytest.mark.slow] if c.number in SLOW | ONE_RUNG else []) for c in CASES]
+    + [pytest.param(c, (DEFAULT,), id=f"{c.number}-{DEFAULT}") for c in CASES if c.number in ONE_RUNG],
 )
-def test_case_keeps_promises_and_bites(hard: Case, context: Context) -> None:
+def test_case_keeps_promises_and_bites(hard: Case, rungs: tuple[str, ...] | None, context: Context) -> None:
+    context = context if rungs is None else replace(context, rungs=rungs)
     result = run_case(hard, context)
     assert not result.failures(context.rungs)
     assert result.outcome is not None

@@ -56,7 +56,7 @@ def test_chi_square_takes_its_own_density_and_refuses_another() -> None:
     assert chi_square_p(*chi_square(rng.multinomial(4000, other), 4000 * p)) < 1e-6
 
 
-@pytest.mark.parametrize("skewed", [False, True])
+@pytest.mark.parametrize("skewed", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_equal_pictures_are_refused_as_often_as_stated(skewed: bool) -> None:
     """At level 10%: of 200 trials at most 20 + 3 deviations; and not far fewer, or it would be blind."""
     rng = np.random.default_rng(11 + skewed)

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from clrt.cli import arguments as kinds
-from clrt.cli import failure, paths, streams
+from clrt.cli import failure, paths
 from clrt.cli.progress import PhaseProgress
-from clrt.files import atomic_write
 
 if TYPE_CHECKING:
     from rich.console import Console, ConsoleOptions, RenderResult
@@ -48,12 +47,7 @@ def explain(scene: Path, json_path: Path | None, quiet: bool, **options: Any) ->
     with PhaseProgress(quiet=quiet) as progress:
         found = _explain(scene, progress, **options)
     if json_path is not None:
-        text = json.dumps(found.to_json(), indent=2, allow_nan=False) + "\n"
-        if json_path is kinds.STDOUT:
-            streams.write(text)
-        else:
-            with atomic_write(json_path) as file:
-                file.write(text.encode())
+        paths.write_text(json.dumps(found.to_json(), indent=2, allow_nan=False) + "\n", json_path)
     if not quiet and json_path is not kinds.STDOUT:
         from clrt.cli.report import print_plainly
 

@@ -7,8 +7,10 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
+from clrt.cli import streams
+from clrt.cli.arguments import STDOUT
 from clrt.errors import ClrtError
-from clrt.files import check_writable
+from clrt.files import atomic_write, check_writable
 
 DEFAULT_SCENE = "input.txt"  #: rendered where no scene is given
 
@@ -53,3 +55,12 @@ def check_outputs(inputs: Mapping[str, Path], outputs: Mapping[str, Path | None]
         if real in taken and (path.is_file() or not path.exists()):
             raise ClrtError(f"{path}: this is the {taken[real]}, too; give the {what} another name")
         taken[real] = what
+
+
+def write_text(text: str, path: Path) -> None:
+    """To standard output where `path` is STDOUT, else the whole file. Raises OSError."""
+    if path is STDOUT:
+        streams.write(text)
+        return
+    with atomic_write(path) as file:
+        file.write(text.encode())

@@ -50,6 +50,8 @@ class Options:
     cache: bool
 
 
+#: the device, until the process ends: freeing it would take apart, piece by piece, all that a compiler has in memory
+_open: list[Task[Device]] = []
 #: what follows a render: seconds to print figures and to end, and seconds a pixel to write a picture, and as many for a second one
 _AFTER_S, _AFTER_PIXEL_S = 0.2, 6e-8
 
@@ -148,23 +150,32 @@ def _check(options: Options, scene_path: Path, picture: Path) -> None:
 
 def _open_device(options: Options) -> Task[Device]:
     """The device, which another thread opens while the scene is read."""
-    from clrt.device import context, kernel_cache
+    from clrt.device import early, kernel_cache
 
     if not options.cache:
         kernel_cache.use_temporary_folder()
-    return Task(partial(context.open_device, options.device))
+    kernel_cache.choose_folder()
+    opening = Task(partial(early.open_device, options.device))
+    _open.append(opening)
+    return opening
 
 
 def _read(options: Options, path: Path, progress: PhaseProgress) -> tuple[Scene, float]:
     """The scene and the seconds it took; its warnings are printed."""
+    from clrt.device.kernel_cache import own_folder
+    from clrt.scene import saved
     from clrt.scene.build import load_scene
+    from clrt.store import Store
 
     progress("read", 0.0)
     start = time.perf_counter()
+    texts = saved.SavedTexts(Store(own_folder("texts"), saved.LIMIT)) if options.cache else None
     scene = load_scene(
         path, right_handed=options.right_handed, split_objects=options.split_objects, allow_paths=options.allow_path,
-        camera=options.camera,
-    )
+        camera=options.camera, saved=texts,
+    )  # fmt: skip
+    if texts is not None:
+        Task(texts.keep)
     for warning in scene.warnings:
         failure.warn(f"{scene.source}: {warning}")
     return scene, time.perf_counter() - start

@@ -12,7 +12,7 @@ import click
 from clrt.cli import arguments as kinds
 from clrt.cli import failure, interrupt, paths, streams
 from clrt.cli.progress import PhaseProgress
-from clrt.files import atomic_write, check_writable
+from clrt.files import check_writable
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -111,12 +111,7 @@ def _compare(files: tuple[Path, Path], json_path: Path | None, quiet: bool) -> N
         check_writable(json_path)
     found = compare(read(files[0]), read(files[1]))
     if json_path is not None:
-        text = json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n"
-        if json_path is kinds.STDOUT:
-            streams.write(text)
-        else:
-            with atomic_write(json_path) as file:
-                file.write(text.encode())
+        paths.write_text(json.dumps(found.to_json(), indent=1, allow_nan=False) + "\n", json_path)
     if not quiet and json_path is not kinds.STDOUT:
         from rich.text import Text
 

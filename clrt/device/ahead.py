@@ -13,14 +13,15 @@ import numpy as np
 
 from clrt.device import kernel_cache, program
 from clrt.device.context import POCL, Device
-from clrt.device.session import PREPARE_LOCAL, multiple
+from clrt.device.prepare import LOCAL
+from clrt.device.session import multiple
 from clrt.tasks import Task
 
-_PREPARE = ("prepare_triangles", "prepare_planes")  #: launched over all triangles; with zeros for arguments all kernels return at once
+_PREPARE = "prepare"  #: launched over all triangles; with zeros for arguments all kernels return at once
 _DUMMY_BYTES = 1 << 16  #: more than any struct that a kernel looks into before it returns
 _KERNEL = re.compile(r"^kernel\b[^{;]*?\bvoid (\w+)\(([^)]*)\)", re.M)
 _DIRECTIVE = re.compile(r"^#.*$", re.M)
-_VALUES: dict[str, Any] = {"int": np.int32(0), "double4": np.zeros(4)}
+_VALUES: dict[str, Any] = {"int": np.int32(0), "double4": np.zeros(4), "float4": np.zeros(4, np.float32)}
 
 
 class Compilation(Task[Any]):
@@ -40,8 +41,8 @@ def _compile(device: Device, source: str, triangles: int) -> Any:
     built = program.build(device, source)
     if device.info.platform == POCL:
         # PoCL tells small launches from large ones, and compiles for each kind: so the sizes are those of later launches.
-        size = multiple(max(1, triangles), PREPARE_LOCAL)
-        sizes = dict.fromkeys(_PREPARE, ((size,), (PREPARE_LOCAL,))) if triangles else {}
+        size = multiple(max(1, triangles), LOCAL)
+        sizes = {_PREPARE: ((size,), (LOCAL,))} if triangles else {}
         _launch(device, built, source, {"render": (program.LOCAL_SIZE, program.LOCAL_SIZE), **sizes})
     return built
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -93,9 +94,10 @@ def list_devices() -> list[DeviceInfo]:
     return [_info(handle, default=i == 0) for i, handle in enumerate(_handles())]
 
 
-def open_device(name: str | None = None) -> Device:
+def open_device(name: str | None = None, contexts: Mapping[int, Any] | None = None) -> Device:
     """The device whose platform or name contains `name` (any case); the default one for None or an empty name.
 
+    contexts : of devices, by their address, that are open already
     A platform comes before a name: two platforms' devices may be one processor, and PoCL's name holds the processor's maker.
     Raises DeviceError with the list of devices where none fits, or where the device lacks float64, in which
     the records that rays test are computed.
@@ -119,5 +121,5 @@ def open_device(name: str | None = None) -> Device:
         pocl_cpu.name_processor(handle)
     import pyopencl as cl
 
-    context = cl.Context([handle])
+    context = (contexts.get(handle.int_ptr) if contexts else None) or cl.Context([handle])
     return Device(info, handle, context, cl.CommandQueue(context))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device import arrays_environment, arrays_placed, arrays_rough, layout, texels
+from clrt.device import arrays_environment, arrays_placed, arrays_rough, arrays_wide, layout, texels
 from clrt.device.arrays_emitters import emitters
 from clrt.device.packed import FloatArray, Packed
 from clrt.device.program import MEDIA_DEPTH, light_dtype
@@ -103,6 +103,7 @@ def _absorption(packed: Packed) -> NDArray[Any]:
 
 
 PACKERS: dict[str, Packer] = {
+    "wide_nodes": arrays_wide.nodes, "wide_blocks": arrays_wide.blocks, "wide_roots": arrays_wide.roots,
     "placements": arrays_placed.placements, "object_origins": arrays_placed.object_origins, "object_tree": arrays_placed.object_tree,
     "emitters": emitters,
     "facet_albedos": arrays_rough.facet_albedos, "glass_albedos": arrays_rough.glass_albedos,

@@ -10,8 +10,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.polynomial import chebyshev
-from numpy.polynomial.legendre import leggauss
 
 from clrt.scene.model import FloatArray
 
@@ -42,7 +40,7 @@ def lobe_albedo(cosine: FloatArray, alpha: FloatArray) -> tuple[FloatArray, Floa
     cosine, alpha = (np.asarray(a, np.float64)[..., None, None] for a in np.broadcast_arrays(cosine, alpha))
     sine = np.sqrt(np.clip((1.0 - cosine) * (1.0 + cosine), 0.0, None))
     # Towards the viewer, then away: the rim's shape changes at a right angle, where nodes gather.
-    nodes, weights = leggauss(12)
+    nodes, weights = np.polynomial.legendre.leggauss(12)
     turn, part = np.pi / 2.0 * ((nodes + 1.0) / 2.0) ** 2, weights * (nodes + 1.0) / 4.0
     along = np.concatenate([np.sin(turn), -np.sin(turn)])[:, None]
     part = np.concatenate([part, part])[:, None]
@@ -50,7 +48,7 @@ def lobe_albedo(cosine: FloatArray, alpha: FloatArray) -> tuple[FloatArray, Floa
     rim = np.sqrt(reach * reach + 1.0) + reach
     rim = np.where(along > 0.0, 1.0 / rim, rim)
     # The slope is alpha tan psi, nodes gather at the rim, where directions graze.
-    nodes, weights = leggauss(16)
+    nodes, weights = np.polynomial.legendre.leggauss(16)
     left = (1.0 - nodes) / 2.0
     widest = np.arctan2(rim, alpha)
     psi = widest * (1.0 - left**3)
@@ -76,8 +74,8 @@ def chebyshev_nodes(count: int) -> FloatArray:
 def chebyshev_fit(values: FloatArray, places: FloatArray) -> FloatArray:
     """Values at `places` of [0, 1], along the last axis, of the polynomial through those at Chebyshev's nodes."""
     count = values.shape[-1]
-    through = np.linalg.inv(chebyshev.chebvander(2.0 * chebyshev_nodes(count) - 1.0, count - 1)).T
-    return np.asarray(values @ through @ chebyshev.chebvander(2.0 * places - 1.0, count - 1).T)
+    through = np.linalg.inv(np.polynomial.chebyshev.chebvander(2.0 * chebyshev_nodes(count) - 1.0, count - 1)).T
+    return np.asarray(values @ through @ np.polynomial.chebyshev.chebvander(2.0 * places - 1.0, count - 1).T)
 
 
 @cache
@@ -91,7 +89,7 @@ def lobe_table() -> FloatArray:
 
 def diffuse_grazing(cosine: FloatArray) -> FloatArray:
     """The mean of (1 - V.H)^5 over light from all sides weighted by its cosine, (n,), for the viewer at cosines (n,)."""
-    nodes, weights = leggauss(48)
+    nodes, weights = np.polynomial.legendre.leggauss(48)
     turn, square = np.pi * (nodes[:, None] + 1.0) / 2.0, (nodes + 1.0) / 2.0
     part = weights[:, None] * weights / 4.0
     light_z, light_x = np.sqrt(square), np.sqrt(1.0 - square) * np.cos(turn)

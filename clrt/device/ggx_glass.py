@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss
 
 from clrt.device.ggx_albedo import GLASS_COSINES, alpha_of, chebyshev_fit, chebyshev_nodes, cosine_at, stretched
 from clrt.scene.model import FloatArray
@@ -38,8 +37,8 @@ def glass_albedo(cosine: FloatArray, alpha: float, ratio: float, fresnel: bool) 
     """The albedo, (n,), at cosines (n,) > 0 of the viewer. ratio : n1 / n2. Error 2e-3, 5e-3 where all light grazes and some
     is reflected totally (test_ggx)."""
     mu = cosine[:, None, None]
-    u, v = ((leggauss(48)[0] + 1.0) / 2.0, (leggauss(64)[0] + 1.0) / 2.0)
-    part = leggauss(48)[1][:, None] * leggauss(64)[1] / 4.0
+    u, v = ((np.polynomial.legendre.leggauss(48)[0] + 1.0) / 2.0, (np.polynomial.legendre.leggauss(64)[0] + 1.0) / 2.0)
+    part = np.polynomial.legendre.leggauss(48)[1][:, None] * np.polynomial.legendre.leggauss(64)[1] / 4.0
     turn, u, v = np.pi * u[:, None], u, 1.0 - v * v
     part = part * 2.0 * np.sqrt(1.0 - v)
     sine = np.sqrt(np.clip((1.0 - mu) * (1.0 + mu), 0.0, None))

@@ -52,6 +52,24 @@ def choose_folder() -> Path:
     return folder
 
 
+def is_new(folder: Path) -> bool:
+    """Whether PoCL has compiled nothing into this folder yet."""
+    try:
+        return not any(re.fullmatch("[A-P]{2}", name) for name in os.listdir(folder))
+    except OSError:
+        return False
+
+
+def remove_failed(word: str) -> None:
+    """Removes what PoCL notes about programs that it could not build for a reason with this word in it."""
+    for log in Path(os.environ.get(VARIABLE, "")).glob("??/*/build.log"):
+        with suppress(OSError, UnicodeDecodeError):
+            if word in log.read_text() and not (log.parent / "program.bc").exists():
+                log.unlink()
+                log.parent.rmdir()
+                log.parent.parent.rmdir()
+
+
 def _sweep(folder: Path) -> None:
     """Removes what PoCL leaves behind: an empty file a process, more at Ctrl-C; those of the last hour may be in use."""
     with suppress(OSError), os.scandir(folder) as entries:

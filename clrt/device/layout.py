@@ -7,7 +7,10 @@ from typing import Any
 
 import numpy as np
 
-_C_NAMES = {np.dtype(np.int16): "short", np.dtype(np.int32): "int", np.dtype(np.int64): "long", np.dtype(np.float64): "double", np.dtype(np.float32): "float"}
+_C_NAMES = {
+    np.dtype(np.int16): "short", np.dtype(np.int32): "int", np.dtype(np.int64): "long", np.dtype(np.float64): "double",
+    np.dtype(np.float32): "float",
+}  # fmt: skip
 
 BOXES = 16  #: entries of leaves whose boxes are compared at once
 

@@ -91,7 +91,7 @@ def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: P
         nodes.append(nodes_of(tree, node, index))
         indices.append((slots[tree.indices] + slot).astype(np.int32))
         orders.append(order)
-        blocks.append(parts + [slot, 0])
+        blocks.append(parts + np.array([slot, 0]))
         node, index, slot = node + len(tree.split_axis), index + len(tree.indices), slot + len(order)
     given = [np.take(item.vertices, order, 0) for item, order in zip(scene.objects, orders, strict=True)]
     vertices = np.concatenate(given) if given else np.zeros((0, 3, 3))
@@ -111,6 +111,7 @@ def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: P
         origins=object_origins(scene, origin),
         real=real,
         features=features,
+        trees=tuple(trees),
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.features import Features
+from clrt.kdtree.tree import KdTree
 from clrt.scene.model import Scene
 
 FloatArray = NDArray[np.float64]
@@ -17,8 +18,10 @@ FloatArray = NDArray[np.float64]
 class Packed:
     """What every program reads; the arrays of effects come from `argument`.
 
-    nodes (m, 2) int32; indices (r,) int32 slots; blocks (b, 2) int32 first slot and count; vertices (s, 3, 3) float64 as given; objects, surfaces, materials, frame: structs
+    nodes (m, 2) int32; indices (r,) int32 slots; vertices (s, 3, 3) float64 as given; objects, surfaces, materials, frame: structs
+    blocks : (b, 2) int32 first slot and count of runs of triangles near each other, BOXES at most
     prim_ids : (s,) int64 primitive id of each slot
+    trees : one an object; block : the width of their wide trees
     origins : (objects, 3) float64, what the coordinates of each object are relative to: `origin`, but for hidden ones
     """
 
@@ -37,6 +40,8 @@ class Packed:
     orders: tuple[NDArray[np.int64], ...]
     real: type[np.floating]
     features: Features
+    trees: tuple[KdTree, ...]
+    block: int = 16
 
     @property
     def slots(self) -> int:

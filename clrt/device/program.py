@@ -24,8 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from clrt.device import kernel_cache, layout
-from clrt.device.context import Device
+from clrt.device import kernel_cache, layout, lean
+from clrt.device.context import POCL, Device
 from clrt.errors import DeviceError, LimitError
 from clrt.features import REAL, Features
 from clrt.precision import Precision
@@ -40,14 +40,17 @@ _ENTRIES = {
 PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a packet, width and height
 TILE = (16, 8)  #: pixels of a tile, width and height: whole packets of any size
 GROUP = (4, 2)  #: packets of a work-item that go together, across and down
+GROUPS_FROM = 256  #: triangles; measured: with few, the rest of the work is as much as the tests that are saved
 GROUP_STACK = 15 * 7 + 1  #: entries: for 7 levels of records, more than 2^27 blocks have
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
 RUN = 32  #: rays of a work-item in arrays of rays
 SORT_BITS = 3  #: an axis, of the grid of origins by which rays are sorted; measured: more bits save nothing
+WIDE_STACK = 16  #: entries of the stack of wide trees, where none is deeper: with 16 children a node, few are
 MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
 #: what stands at a place where no effect adds anything
 _DEFAULTS = {"trace": "        //@ eye_trace", "eye_trace": "        scene_trace(&geometry, &rays, 1, 0, &hits);", "next": "        break;",
+             "shadow_trace": "    scene_trace(&seen, &rays, SHADOW_SHARED_ORIGIN, 1, &hits);",
              "tie": "    closer |= is_equal(t, hits->t) & is_less((mask_n)slot, hits->slot);",
              "eye_rays": "    //@ camera", "camera": "    camera_rays(frame, column, row, &rays);",
              "surface": "        hit_surface(&geometry, frame, surfaces, &rays, &hits, &hit);",
@@ -72,6 +75,8 @@ class Shape:
     shared_lights : whether edge planes as seen from the lights are at hand
     tree : entries of the stack of the tree over boxes, at least its depth
     block : of arrays of rays, the triangles that are tested at once
+    wide : entries of the stack of wide trees, at least the depth of the deepest
+    groups : of pictures, whether packets go together, where they have more than one lane
     """
 
     stack: int
@@ -79,6 +84,8 @@ class Shape:
     shared_lights: bool = True
     tree: int = 8
     block: int = 0
+    wide: int = WIDE_STACK
+    groups: bool = False
 
 
 def bounce_stack(features: Features, depth: int) -> int:
@@ -86,27 +93,33 @@ def bounce_stack(features: Features, depth: int) -> int:
     return (max(2, sum(f.branches for f in features.active)) - 1) * depth + 2
 
 
+def block_width(lanes: int) -> int:
+    """The triangles of a block, and the children of a wide node, on a device that holds `lanes` numbers in a vector."""
+    return max(4, lanes)
+
+
 def stack_size(tree_depth: int) -> int:
     """Stack entries for trees of this depth: rounded up to a multiple of 8, so that few programs serve all scenes."""
     return max(8, -(-(tree_depth + 1) // 8) * 8)
 
 
-def grouped(features: Features, lanes: int) -> bool:
-    """Whether packets of pixels go together (group.cl): where their rays share the eye, and objects are few enough to be met in turn."""
-    alone = {"object tree", "wide eye", "sampling"}
-    return lanes > 1 and not features.every and alone.isdisjoint(f.name for f in features.active)
+def groups_pay(features: Features, triangles: int) -> bool:
+    """Whether packets of pixels are to go together (group.cl): where their rays share the eye, and there are many triangles."""
+    alone = {"object tree", "wide eye"}
+    return triangles >= GROUPS_FROM and not features.every and alone.isdisjoint(f.name for f in features.active)
 
 
-def lights_grouped(features: Features, lanes: int, shared_lights: bool) -> bool:
+def lights_grouped(features: Features, lanes: int, shape: Shape) -> bool:
     """Whether shadow rays of what the eye sees do, too (group_shadow.cl): where they depend on the hit alone."""
     names = {f.name for f in features.active}
-    return grouped(features, lanes) and shared_lights and "shadows" in names and names.isdisjoint(("opacity shadows", "spot", "fog"))
+    others = ("opacity shadows", "spot", "fog")
+    return shape.groups and lanes > 1 and shape.shared_lights and "shadows" in names and names.isdisjoint(others)
 
 
-def item_size(features: Features, lanes: int) -> tuple[int, int]:
+def item_size(lanes: int, groups: bool) -> tuple[int, int]:
     """Pixels of a work-item of `render`: width and height."""
     width, height = PACKETS[lanes]
-    return (width * GROUP[0], height * GROUP[1]) if grouped(features, lanes) else (width, height)
+    return (width * GROUP[0], height * GROUP[1]) if groups and lanes > 1 else (width, height)
 
 
 @cache
@@ -124,7 +137,7 @@ def kernel_source(name: str) -> tuple[str, tuple[tuple[str, str, int], ...]]:
     return _HOOK.sub("", text).rstrip("\n") + "\n", hooks
 
 
-def _structs(features: Features, precision: Precision, lanes: int, entry: str, block: int) -> str:
+def _structs(features: Features, precision: Precision, lanes: int, shape: Shape, entry: str) -> str:
     real = precision.real
     names = [
         ("Triangle", layout.triangle(real)), ("EdgePlanes", layout.edge_planes(real)), ("Object", layout.object_record(real)),
@@ -136,10 +149,12 @@ def _structs(features: Features, precision: Precision, lanes: int, entry: str, b
         ("Emitter", layout.emitter), ("Placement", layout.placement), ("EnvironmentRow", layout.environment_row),
     )  # fmt: skip
     names += [(name, make(real)) for name, make in optional if f" {name} " in declared]
-    if entry == "render" and grouped(features, lanes):
+    if entry == "render" and shape.groups and lanes > 1:
         names.append(("DirectionBoxes", layout.direction_boxes()))
-    if entry == "cast":
+    if entry == "cast" or " WideNode " in declared:
+        block = shape.block or block_width(lanes)
         names += [("WideNode", layout.wide_node(real, block)), ("Block", layout.block(real, block))]
+    if entry == "cast":
         names += [("GivenRay", layout.GIVEN_RAY), ("HitSource", layout.HIT_SOURCE), ("HitRecord", layout.HIT_RECORD)]
     return "".join(layout.c_struct(name, dtype) for name, dtype in names)
 
@@ -164,11 +179,13 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     values: dict[str, int] = {"REAL_BITS": precision.bits, "LANES": lanes, "PACKET_WIDTH": width, "PACKET_HEIGHT": height,
                               "STACK_SIZE": shape.stack}  # fmt: skip
     if shape.block:
-        values |= {"BLOCK": shape.block, "SORT_BITS": SORT_BITS, "RUN": RUN}
+        values |= {"BLOCK": shape.block, "WIDE_STACK": shape.wide, "SORT_BITS": SORT_BITS, "RUN": RUN}
     names = {f.name for f in features.active}
-    values |= dict(zip(("ITEM_WIDTH", "ITEM_HEIGHT"), item_size(features, lanes), strict=True))
-    if grouped(features, lanes):
+    values |= dict(zip(("ITEM_WIDTH", "ITEM_HEIGHT"), item_size(lanes, shape.groups), strict=True))
+    if shape.groups and lanes > 1:
         values |= {"GROUP": GROUP[0] * GROUP[1], "BOXES": layout.BOXES, "GROUP_STACK": GROUP_STACK}
+    if "single rays" in names:
+        values |= {"BLOCK": block_width(lanes), "WIDE_STACK": shape.wide}
     if "sampling" in names:
         values |= {"TILE_WIDTH": TILE[0], "TILE_HEIGHT": TILE[1]}
     if "shadows" in names:
@@ -205,7 +222,7 @@ def _insert(name: str, text: str, hooks: dict[str, list[tuple[str, str, int]]]) 
 
 def _files(features: Features, precision: Precision, lanes: int, shape: Shape, entry: str) -> Iterator[str]:
     before, between, after = _ENTRIES[entry]
-    together = entry == "render" and grouped(features, lanes)
+    together = entry == "render" and shape.groups and lanes > 1
     instead = {f.replaces: f.kernel for f in features.active if f.replaces}
     yield from (*_RAYS, *precision.kernels, *_TREES)
     yield from ("directions.cl",) if together else ()
@@ -216,7 +233,7 @@ def _files(features: Features, precision: Precision, lanes: int, shape: Shape, e
     yield from ("frustum.cl",) if together else ()
     yield from (f.kernel for f in features.active if not f.early)
     yield from ("group.cl",) if together else ()
-    yield from ("group_shadow.cl",) if entry == "render" and lights_grouped(features, lanes, shape.shared_lights) else ()
+    yield from ("group_shadow.cl",) if together and lights_grouped(features, lanes, shape) else ()
     yield from after
 
 
@@ -238,7 +255,7 @@ def compose(features: Features, precision: Precision, lanes: int, shape: Shape, 
         for place, code, line in kernel_source(name)[1]:
             hooks.setdefault(place, []).append((name, code, line))
     chunks = [_defines(features, precision, lanes, shape, counting), f'#line 1 "lanes.cl"\n{kernel_source("lanes.cl")[0]}']
-    chunks.append(f'#line 1 "structs"\n{_structs(features, precision, lanes, entry, shape.block)}')
+    chunks.append(f'#line 1 "structs"\n{_structs(features, precision, lanes, shape, entry)}')
     for name in files:
         chunks.append(f'#line 1 "{name}"\n' + _insert(name, kernel_source(name)[0], hooks))
     return _COUNTING.sub(r"\1\2\n" if counting else "\n", "".join(chunks))
@@ -255,6 +272,10 @@ def private_bytes(precision: Precision, lanes: int, shape: Shape, features: Feat
     traversal = shape.stack * (2 * lane_bytes + 4) * copies
     if "object tree" in names:
         traversal += shape.tree * (lane_bytes + 4) * copies + ("placed" in names) * shape.stack * (2 * lane_bytes + 4) * copies
+    if "single rays" in names:
+        traversal += shape.wide * (block_width(lanes) * (precision.bits // 8 + 4) + 4)
+    if shape.groups and lanes > 1:
+        traversal += GROUP[0] * GROUP[1] * (lane_bytes * 100 + 256) + 16 * GROUP_STACK
     return traversal + (entry * (bounce_stack(features, shape.depth) + 2) if "bounce" in names else 0) + (16 << 10)
 
 
@@ -292,15 +313,16 @@ def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> An
 
     check_options((*options, *os.environ.get("PYOPENCL_BUILD_OPTIONS", "").split()))  # pyopencl adds these to ours
     error: Exception | None = None
-    for text in (source, source + "\n// built again, past the cache\n"):
+    for text, more in lean.attempts(kernel_folder(), source, pocl=device.info.platform == POCL):
         try:
             with warnings.catch_warnings(), kernel_cache.loading():
                 warnings.simplefilter("ignore", cl.CompilerWarning)
-                built = cl.Program(device.context, text).build(options=list(options))
-                for name in _KERNEL.findall(text):  # what a broken entry lacks is missed only when it is asked for
+                built = cl.Program(device.context, text).build(options=[*options, *more])
+                for name in _KERNEL.findall(source):  # what a broken entry lacks is missed only when it is asked for
                     cl.Kernel(built, name)
             return built
         except cl.Error as failure:
             error = failure
-            kernel_cache.suspect()
+            if not (more and lean.lacks(failure)):
+                kernel_cache.suspect()
     raise DeviceError(f"the device '{device.info.name}' could not compile the program: {error}") from error

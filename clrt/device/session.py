@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from clrt.device import kernel_cache, layout, program
+from clrt.device.arrays_wide import wide_trees
 from clrt.device.context import Device
 from clrt.device.effect_arrays import PACKERS
 from clrt.device.packed import Packed
@@ -16,9 +18,8 @@ from clrt.features import Features
 from clrt.precision import Precision
 from clrt.scene.model import Scene
 
-PREPARE_LOCAL = 64
-OUTERMOST = 32000  #: steps to the direction farthest from the middle: an int16 holds all
 FILM_BYTES = 12  #: a pixel of the film: three float32
+_WRITTEN = ("sample_sums", "wide_blocks")  #: arrays of effects that kernels fill
 
 
 def check_buffer(device: Device, size: int, what: str) -> None:
@@ -46,11 +47,16 @@ def shares_lights(scene: Scene, precision: Precision, device: Device, slots: int
 
 
 class Buffers:
-    """The device's copy of a packed scene. `shared_lights`: whether edge planes of every light fit in memory."""
+    """The device's copy of a packed scene.
 
-    def __init__(self, device: Device, packed: Packed, features: Features, precision: Precision) -> None:
+    groups : whether packets of its pictures go together; shared_lights : whether edge planes of every light fit in memory
+    """
+
+    def __init__(self, device: Device, packed: Packed, features: Features, precision: Precision, groups: bool = False) -> None:
+        packed = replace(packed, block=program.block_width(precision.lanes(device.info.lanes)))
         self.device, self.packed, self.features, self.precision = device, packed, features, precision
         self.lanes = precision.lanes(device.info.lanes)
+        self.groups = groups and self.lanes > 1
         self.plane_bytes = max(1, packed.slots) * layout.edge_planes(precision.real).itemsize
         lights = len(packed.scene.lights_with_position)
         self.shared_lights = shares_lights(packed.scene, precision, device, packed.slots)
@@ -59,7 +65,7 @@ class Buffers:
         self.vertices = self.upload(packed.vertices)
         self.core = [self.upload(a) for a in (packed.nodes, packed.indices, packed.objects, packed.surfaces, packed.materials)]
         self.effects = {
-            name: self.upload(np.zeros(0, np.int32) if features.idle(f) else PACKERS[name](packed), writable=name == "sample_sums")
+            name: self.upload(np.zeros(0, np.int32) if features.idle(f) else PACKERS[name](packed), writable=name in _WRITTEN)
             for f in features.active for name, _ in f.parameters if name != "light_planes"
         }
         self.triangles = self.empty(max(1, packed.slots) * layout.triangle(precision.real).itemsize)
@@ -67,7 +73,12 @@ class Buffers:
         with_shadows = any(name == "light_planes" for f in features.active for name, _ in f.parameters)
         if with_shadows:
             self.effects["light_planes"] = self.empty(self.plane_bytes * (max(1, lights) if self.shared_lights else 1))
-        self.boxes: list[Any] = []  #: of directions, as seen from the eye, then as from all lights
+        self.boxes = self._boxes() if self.groups else []  #: of directions, as seen from the eye, then as from all lights
+
+    @property
+    def wide_stack(self) -> int:
+        """Entries of the stack of wide trees."""
+        return max(program.WIDE_STACK, wide_trees(self.packed).stack) if "single rays" in dict(self.features.lines) else program.WIDE_STACK
 
     @property
     def size(self) -> int:
@@ -77,7 +88,7 @@ class Buffers:
 
     @property
     def box_levels(self) -> list[int]:
-        """Records of boxes as seen from one origin: blocks, records of 16 of those, and so on to one. None where every ray meets all triangles."""
+        """Records of boxes as seen from one origin: blocks, records of 16 of those, and so on to one. None where trees have but a leaf."""
         split = len(self.packed.nodes) > len(self.packed.objects)
         levels = [len(self.packed.blocks)] if split and len(self.packed.blocks) else []
         while levels and levels[-1] > 1:
@@ -89,12 +100,12 @@ class Buffers:
         """All of them, and the one in front of them that tells how directions are measured; or 0."""
         return 1 + sum(self.box_levels) if self.box_levels else 0
 
-    def make_boxes(self) -> None:
-        """Room for boxes of directions, where the program of these features reads any."""
-        lights = program.lights_grouped(self.features, self.lanes, self.shared_lights)
-        origins = [1, len(self.packed.scene.lights_with_position)] if lights else [1]
+    def _boxes(self) -> list[Any]:
+        """Room for the boxes of directions that the program reads."""
+        shape = program.Shape(0, shared_lights=self.shared_lights, groups=True)
+        lights = program.lights_grouped(self.features, self.lanes, shape)
         size = max(1, self.box_count) * layout.direction_boxes().itemsize
-        self.boxes = [self.empty(size * n) for n in origins] if program.grouped(self.features, self.lanes) else []
+        return [self.empty(size * n) for n in ([1, len(self.packed.scene.lights_with_position)] if lights else [1])]
 
     def _check_memory(self) -> None:
         need, there = self.plane_bytes * 4, self.device.handle.global_mem_size
@@ -114,79 +125,6 @@ class Buffers:
 
         check_buffer(self.device, size, "the scene")
         return cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, size)
-
-    def prepare(self, built: Any, *, planes: bool = True) -> None:
-        """Computes the records that rays test, on the device, from the vertices as given; `planes`: those of shared origins, too."""
-        import pyopencl as cl
-
-        packed, queue, count = self.packed, self.device.queue, np.int32(self.packed.slots)
-        if not packed.slots:
-            return
-        size = (-(-packed.slots // PREPARE_LOCAL) * PREPARE_LOCAL,)
-        with kernel_cache.loading():
-            kernel = cl.Kernel(built, "prepare_triangles")
-            for origin, first, end in packed.runs:
-                part = (-(-(end - first) // PREPARE_LOCAL) * PREPARE_LOCAL,)
-                kernel(
-                    queue, part, (PREPARE_LOCAL,), self.vertices, _double4(origin), self.triangles, np.int32(end), global_offset=(first,)
-                )
-            if planes:
-                self._prepare_planes(cl.Kernel(built, "prepare_planes"), size, count)
-                if self.boxes and self.box_count:
-                    self._prepare_boxes(built)
-            queue.finish()
-
-    def _prepare_planes(self, kernel: Any, size: tuple[int], count: np.int32) -> None:
-        packed, queue, local = self.packed, self.device.queue, (PREPARE_LOCAL,)
-        kernel(queue, size, local, self.vertices, _double4(packed.scene.camera.eye), self.eye_planes, np.int32(0), count)
-        if "light_planes" in self.effects and self.shared_lights:
-            for i, light in enumerate(packed.scene.lights_with_position):
-                first = np.int32(i * packed.slots)
-                kernel(queue, size, local, self.vertices, _double4(np.asarray(light.position)), self.effects["light_planes"], first, count)
-
-    def _prepare_boxes(self, built: Any) -> None:
-        import pyopencl as cl
-
-        packed, local = self.packed, (PREPARE_LOCAL,)
-        levels, blocks = self.box_levels, self.upload(packed.blocks)
-        of_triangles, of_records = cl.Kernel(built, "prepare_directions"), cl.Kernel(built, "prepare_unions")
-        wanted = [(self.boxes[0], 0, packed.scene.camera.eye)]
-        if len(self.boxes) > 1:
-            lights = packed.scene.lights_with_position
-            wanted += [(self.boxes[1], i * self.box_count, np.asarray(light.position)) for i, light in enumerate(lights)]
-        for boxes, first, origin in wanted:
-            scale = direction_scale(origin - packed.origin, packed.objects)
-            size = (multiple(levels[0] * layout.BOXES, PREPARE_LOCAL),)
-            of_triangles(
-                self.device.queue, size, local, self.vertices, blocks, _double4(origin), scale, boxes, np.int32(first), np.int32(levels[0])
-            )
-            below = 1
-            for count in levels[:-1]:
-                size = (multiple(multiple(count, layout.BOXES), PREPARE_LOCAL),)
-                of_records(self.device.queue, size, local, boxes, np.int32(first), np.int32(below), np.int32(below + count), np.int32(count))
-                below += count
-        self.device.queue.finish()
-
-
-def direction_scale(origin: NDArray[np.float64], objects: NDArray[np.void]) -> NDArray[np.float32]:
-    """(4,): the direction to the middle of all objects and the steps a unit in which others are measured from it (cull.cl).
-
-    origin : (3,), relative to what the objects' boxes are relative to
-
-    All objects lie in a sphere, as seen from outside it in a cone: no direction in it is farther from its middle than twice the sine of
-    half its angle. From inside, directions go all around.
-    """
-    lo, hi = objects["lo"].min(0).astype(np.float64), objects["hi"].max(0).astype(np.float64)
-    to_middle, radius = (lo + hi) / 2 - origin, np.linalg.norm(hi - lo) / 2
-    distance = np.linalg.norm(to_middle)
-    if not radius < distance < np.inf:
-        return np.array([0, 0, 0, OUTERMOST], np.float32)
-    farthest = max(2 * np.sin(np.arcsin(radius / distance) / 2), 1e-6)
-    return np.array([*(to_middle / distance), OUTERMOST / farthest], np.float32)
-
-
-def _double4(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    return np.array([*values, 0.0])
 
 
 class StageCounter:
@@ -215,7 +153,7 @@ class Tracer:
         scene = buffers.packed.scene
         self.buffers, self.counting = buffers, counting
         self.width, self.height = scene.camera.width, scene.camera.height
-        self.item = program.item_size(buffers.features, buffers.lanes)
+        self.item = program.item_size(buffers.lanes, buffers.groups)
         self.film = buffers.empty(self.width * self.height * FILM_BYTES)
         self.kernel = cl.Kernel(built, "render")
         self.counters = np.zeros(len(buffers.features.ray_kinds) + len(scene.objects), np.uint64)
@@ -240,8 +178,6 @@ class Tracer:
         self.stages = StageCounter(buffers) if buffers.precision.decides_in_stages else None
         if self.stages is not None:
             self._after += (self.stages.buffer,)
-        if not buffers.boxes:
-            buffers.make_boxes()
         if buffers.boxes:
             eye_boxes, *light_boxes = buffers.boxes
             self._after += (eye_boxes, np.int32(len(buffers.packed.blocks)), np.int32(buffers.box_count), *light_boxes)
@@ -268,6 +204,11 @@ class Tracer:
         queue = self.buffers.device.queue
         self.kernel(queue, size, program.LOCAL_SIZE, frame, *self._before[1:], *rows, *after, *self._after[len(after) :])
         queue.finish()
+
+    @property
+    def row_step(self) -> int:
+        """Rows that launches best begin and end at: of whole work-items, and of whole tiles."""
+        return max(program.TILE[1], self.item[1])
 
     def warm_up(self) -> None:
         """Launches over no rows: PoCL compiles for a local size at its first launch, which belongs to compiling."""

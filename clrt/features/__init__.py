@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from clrt.features import camera, cutouts, helpers, lamps, motion, placed, rough, sampled, shapes, surfaces, surroundings, volume
+from clrt.features import camera, cutouts, helpers, lamps, motion, placed, rough, sampled, shapes, single, surfaces, surroundings, volume
 from clrt.features.feature import REAL, Calls, Feature
 from clrt.scene.model import Scene
 
@@ -28,6 +28,8 @@ FEATURES: tuple[Feature, ...] = (
     camera.SAMPLES,
     helpers.WIDE_EYE,
     helpers.PATH,
+    single.BLOCKS,
+    single.SINGLE,
     placed.INSTANCES,
     motion.MOTION,
     placed.PLACED,

@@ -32,13 +32,14 @@ from clrt.scene.words import WORDS, Draft, Word
 
 if TYPE_CHECKING:
     from clrt.scene.mesh_lines import MeshLine
+    from clrt.scene.saved import SavedTexts
 
 _ANYTHING = re.compile(r"[^\s\ufeff]")
 
 
 def load_scene(
     path: str | PathLike[str], *, right_handed: bool = False, split_objects: bool = False,
-    allow_paths: Sequence[str | PathLike[str]] = (), camera: int | None = None,
+    allow_paths: Sequence[str | PathLike[str]] = (), camera: int | None = None, saved: SavedTexts | None = None,
 ) -> Scene:  # fmt: skip
     """Read and check the scene text of a file, or the scene of a glTF or GLB file.
 
@@ -46,6 +47,7 @@ def load_scene(
     split_objects : make each connected component of triangles an object, where no O line closes one
     allow_paths : folders, besides the scene's own, that the files it names may be in
     camera : which of the cameras of a glTF file, from 1; the first without it
+    saved : numbers of texts that earlier runs read
 
     Raises SceneError with one `file:line:column: error: ...` line a fault, also where the file cannot be read.
     """
@@ -59,12 +61,14 @@ def load_scene(
     if camera is not None:
         raise SceneError(f"{path}: error: --camera chooses among the cameras of a glTF file; a scene text has one, leave it out")
     folders = Folders(Path(path).parent, [Path(p) for p in allow_paths])
-    return parse_scene(read_file(Path(path)), str(path), right_handed=right_handed, split_objects=split_objects, folders=folders)
+    text = read_file(Path(path))
+    return parse_scene(text, str(path), right_handed=right_handed, split_objects=split_objects, folders=folders, saved=saved)
 
 
 def parse_scene(
-    text: str, source: str = "<text>", *, right_handed: bool = False, split_objects: bool = False, folders: Folders | None = None
-) -> Scene:
+    text: str, source: str = "<text>", *, right_handed: bool = False, split_objects: bool = False, folders: Folders | None = None,
+    saved: SavedTexts | None = None,
+) -> Scene:  # fmt: skip
     """Check a scene text that is in memory; `source` stands for the file's name in messages. Otherwise as `load_scene`.
 
     folders : where files that the scene names may be; without it, the current folder
@@ -75,7 +79,7 @@ def parse_scene(
         faults.raise_if_any()
     folders = folders or Folders(Path())
     text, origins = expand(text, source, folders, faults)
-    found = read_declarations(text, source, faults)
+    found = read_declarations(text, source, faults, saved=saved)
     if origins:
         found.words = [origins.relocated(call, folders) for call in found.words]
     if _lacks_lines(found, faults):

@@ -50,6 +50,11 @@ class Rows:
         return len(self.lines)
 
 
+#: lines that are left to the exact reader, each with its index; what is read: (letter, fields) -> rows, and what is left
+Left = list[tuple[int, str]]
+Read = tuple[dict[tuple[str, int], Rows], Left]
+
+
 @dataclass(frozen=True, eq=False)
 class LineTable:
     """What the bytes of each line say.
@@ -121,10 +126,10 @@ def _values(table: LineTable, chosen: NDArray[np.int64], fields: int, block: str
     return chosen, values
 
 
-def read_bulk(text: str) -> tuple[dict[tuple[str, int], Rows], list[tuple[int, str]]]:
+def read_bulk(text: str) -> Read:
     """Convert all plain lines: (letter, fields) -> rows, and the lines that are left, each with its index, empty ones aside."""
     found: dict[tuple[str, int], list[Rows]] = {}
-    left: list[tuple[int, str]] = []
+    left: Left = []
     start = before = 0
     while start <= len(text):
         end = text.find("\n", start + _BLOCK)

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,9 @@ from clrt.scene.grammar import LETTERS, counts_taken
 from clrt.scene.model import FloatArray
 from clrt.scene.tokens import Token, read_number, report_range, tokenise
 from clrt.scene.words import WORDS, WordCall, read_word
+
+if TYPE_CHECKING:
+    from clrt.scene.saved import SavedTexts
 
 
 @dataclass(eq=False)
@@ -108,19 +112,25 @@ def decode(data: bytes, source: str) -> str:
 
 def plain_lines(text: str) -> list[str]:
     """The lines of a text with any line ends, without a byte order mark."""
-    return text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return _unix(text).split("\n")
 
 
-def read_declarations(text: str, source: str, faults: Faults, *, bulk: bool = True) -> Declarations:
+def _unix(text: str) -> str:
+    """A text with line feeds for line ends, without a byte order mark."""
+    text = text.removeprefix("\ufeff")
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+
+
+def read_declarations(text: str, source: str, faults: Faults, *, bulk: bool = True, saved: SavedTexts | None = None) -> Declarations:
     """Read all lines; faults are noted, and the lines that have them kept apart.
 
-    `bulk=False` takes every line through the exact reader: the same values, slowly.
+    `bulk=False` takes every line through the exact reader: the same values, slowly. saved : what earlier runs read in bulk
     """
-    text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
+    text = _unix(text)
     found = Declarations(source, text)
     left: Iterable[tuple[int, str]] = enumerate(found.text_lines) if not bulk else ()
     if bulk:
-        found.rows, left = read_bulk(text)
+        found.rows, left = read_bulk(text) if saved is None else saved.read(text)
     _ExactReader(found, faults).read(left)
     _check_ranges(found, faults)
     return found

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,6 +58,8 @@ def face_normals(vertices: FloatArray) -> FloatArray:
 
 def _exact_direction(triangle: FloatArray) -> FloatArray:
     """The cross product of one triangle (3, 3), computed in rational numbers and then scaled to at most 1."""
+    from fractions import Fraction
+
     v0, v1, v2 = ([Fraction(c) for c in corner] for corner in triangle.tolist())
     a = [p - q for p, q in zip(v1, v0, strict=True)]
     b = [p - q for p, q in zip(v2, v0, strict=True)]

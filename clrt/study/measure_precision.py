@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from clrt.device import program
+from clrt.device.prepare import prepare
 from clrt.features import Features
 from clrt.precision import DEFAULT, RUNGS, rung
 from clrt.renderer import fill_buffers, render
@@ -62,7 +63,7 @@ def _builds(subject: Subject, shots: dict[str, Shot]) -> dict[str, list[float]]:
 
 
 def _build(subject: Subject, name: str, built: Any) -> None:
-    fill_buffers(subject.prepared, Features.of(subject.scene), rung(name), subject.device)[0].prepare(built)
+    prepare(fill_buffers(subject.prepared, Features.of(subject.scene), rung(name), subject.device)[0], built)
 
 
 def _ratio(traces: dict[str, Series], name: str) -> Number:

@@ -1,0 +1,111 @@
+"""The records that rays test, made on the device from the vertices as given: one kernel for all kinds, launched over each (prepare.cl)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clrt.device import kernel_cache, layout
+from clrt.device.arrays_wide import wide_trees
+from clrt.device.session import Buffers, multiple
+
+LOCAL = 64
+_TRIANGLES, _PLANES, _DIRECTIONS, _UNIONS = map(np.int32, range(4))
+_OUTERMOST = 32000  #: steps to the direction farthest from the middle: an int16 holds all
+
+
+def prepare(buffers: Buffers, built: Any, *, planes: bool = True) -> None:
+    """Computes the records of all triangles and waits for them; `planes`: those as seen from shared origins, too."""
+    if not buffers.packed.slots:
+        return
+    with kernel_cache.loading():
+        _Launches(buffers, built, planes).run()
+        buffers.device.queue.finish()
+
+
+class _Launches:
+    def __init__(self, buffers: Buffers, built: Any, planes: bool) -> None:
+        import pyopencl as cl
+
+        self.buffers, self.built, self.planes = buffers, built, planes
+        self.kernel = cl.Kernel(built, "prepare")
+        packed = buffers.packed
+        self.eye = np.asarray(packed.scene.camera.eye)
+        self.lights = [np.asarray(light.position) for light in packed.scene.lights_with_position]
+        #: PoCL tells small launches from large ones, and compiles for each kind: those of a few records are as large as the first
+        self.least = packed.runs[0][2] - packed.runs[0][1]
+        self.blocks = buffers.upload(packed.blocks) if buffers.boxes else None
+
+    def run(self) -> None:
+        buffers, packed = self.buffers, self.buffers.packed
+        for origin, first, end in packed.runs:
+            self._launch(_TRIANGLES, end - first, origin, 0, end, offset=first)
+        if "single rays" in dict(buffers.features.lines):
+            self._single_rays()
+        if not self.planes:
+            return
+        self._launch(_PLANES, packed.slots, self.eye, 0, packed.slots, planes=buffers.eye_planes)
+        if "light_planes" in buffers.effects and buffers.shared_lights:
+            for i, light in enumerate(self.lights):
+                self._launch(_PLANES, packed.slots, light, i * packed.slots, packed.slots, planes=buffers.effects["light_planes"])
+        if buffers.boxes and buffers.box_count:
+            self._directions(self.eye, buffers.boxes[0], 0)
+            for i, light in enumerate(self.lights if len(buffers.boxes) > 1 else ()):
+                self._directions(light, buffers.boxes[1], i * buffers.box_count)
+
+    def _launch(self, what: np.int32, items: int, origin: NDArray[np.float64], first: int, end: int, *, planes: Any = None, offset: int = 0,
+                of_boxes: tuple[Any, ...] = ()) -> None:  # fmt: skip
+        buffers = self.buffers
+        if buffers.boxes and not of_boxes:
+            of_boxes = self._of_boxes(np.zeros(4, np.float32), buffers.boxes[0])
+        size = (multiple(max(items, self.least), LOCAL),)
+        records = buffers.triangles, buffers.eye_planes if planes is None else planes
+        given = what, buffers.vertices, np.array([*origin, 0.0]), *records, np.int32(first), np.int32(end), *of_boxes
+        self.kernel(buffers.device.queue, size, (LOCAL,), *given, global_offset=(offset,))
+
+    def _of_boxes(self, scale: NDArray[np.float32], boxes: Any, below: int = 0, count: int = 0) -> tuple[Any, ...]:
+        return self.blocks, scale, boxes, np.int32(below), np.int32(count)
+
+    def _directions(self, origin: NDArray[np.float64], boxes: Any, first: int) -> None:
+        """Of blocks, then level by level of the records above them."""
+        packed, levels = self.buffers.packed, self.buffers.box_levels
+        scale = direction_scale(origin - packed.origin, packed.objects)
+        items = levels[0] * layout.BOXES
+        self._launch(_DIRECTIONS, items, origin, first, items, of_boxes=self._of_boxes(scale, boxes))
+        below = 1
+        for count in levels[:-1]:
+            items = multiple(count, layout.BOXES)
+            self._launch(_UNIONS, items, origin, first, items, of_boxes=self._of_boxes(scale, boxes, below, count))
+            below += count
+
+    def _single_rays(self) -> None:
+        """Blocks of the wide trees."""
+        import pyopencl as cl
+
+        buffers = self.buffers
+        slots = wide_trees(buffers.packed).slots
+        given = buffers.upload(slots)
+        size = (multiple(slots.size, LOCAL),)
+        cl.Kernel(self.built, "prepare_blocks")(
+            buffers.device.queue, size, (LOCAL,), buffers.triangles, given, buffers.effects["wide_blocks"], np.int32(slots.size)
+        )
+        buffers.device.queue.finish()
+
+
+def direction_scale(origin: NDArray[np.float64], objects: NDArray[np.void]) -> NDArray[np.float32]:
+    """(4,): the direction to the middle of all objects, and the steps a unit in which others are measured from it (directions.cl).
+
+    origin : (3,), relative to what the objects' boxes are relative to
+
+    All objects lie in a sphere, as seen from outside it in a cone: no direction in it is farther from its middle than twice the sine of
+    half its angle. From inside, directions go all around.
+    """
+    lo, hi = objects["lo"].min(0).astype(np.float64), objects["hi"].max(0).astype(np.float64)
+    to_middle, radius = (lo + hi) / 2 - origin, np.linalg.norm(hi - lo) / 2
+    distance = np.linalg.norm(to_middle)
+    if not radius < distance < np.inf:
+        return np.array([0, 0, 0, _OUTERMOST], np.float32)
+    farthest = max(2 * np.sin(np.arcsin(radius / distance) / 2), 1e-6)
+    return np.array([*(to_middle / distance), _OUTERMOST / farthest], np.float32)
