@@ -16,7 +16,7 @@ from clrt.device.context import POCL, Device
 from clrt.device.session import PREPARE_LOCAL, multiple
 from clrt.tasks import Task
 
-_PREPARE = ("prepare_triangles", "prepare_planes")  #: launched over all triangles; with zeros for arguments all kernels return at once
+_PREPARE = ("prepare_triangles", "prepare_planes", "prepare_blocks")  #: launched over all triangles
 _DUMMY_BYTES = 1 << 16  #: more than any struct that a kernel looks into before it returns
 _KERNEL = re.compile(r"^kernel\b[^{;]*?\bvoid (\w+)\(([^)]*)\)", re.M)
 _DIRECTIVE = re.compile(r"^#.*$", re.M)
@@ -47,7 +47,10 @@ def _compile(device: Device, source: str, triangles: int) -> Any:
 
 
 def _launch(device: Device, built: Any, source: str, sizes: dict[str, tuple[tuple[int, ...], tuple[int, ...]]]) -> None:
-    """Each kernel with its global and local size, over nothing. One that has an argument of another type is left to its first launch."""
+    """Each kernel with its global and local size, over nothing: with zeros for arguments all return at once.
+
+    One that has an argument of another type is left to its first launch.
+    """
     import pyopencl as cl
 
     queue = cl.CommandQueue(device.context)
