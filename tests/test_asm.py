@@ -88,7 +88,10 @@ def test_without_a_disassembler_one_is_asked_for(monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.skipif(disassembly.disassembler() is None, reason="no disassembler (objdump, llvm-objdump) is installed")
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="instructions of x86-64 alone are read")
-@pytest.mark.parametrize(("precision", "rare"), [("fast", set()), ("watertight", {"triangle_grazing"}), ("exact", {"triangle_unsure"})])
+@pytest.mark.parametrize(
+    ("precision", "rare"),
+    [pytest.param("fast", set(), marks=pytest.mark.slow), ("watertight", {"triangle_grazing"}), ("exact", {"triangle_unsure"})],
+)
 def test_traversal_calls_no_function(precision: str, rare: set[str], tmp_path: Path) -> None:
     if all(device.platform != POCL for device in list_devices()):
         pytest.skip("only PoCL leaves compiled kernels behind")

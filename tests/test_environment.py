@@ -258,6 +258,7 @@ def test_cube_of_the_smallest_scene_shows_what_its_comment_says() -> None:
         assert (error.max() == 0.0) == (kind == "pixel")
 
 
+@pytest.mark.slow
 def test_overcast_sky_shows_white_on_what_faces_it() -> None:
     text = "E 0 5 0\nV 0 -1 0 0 0 1\nF 20\nR 6 6\nM 1 1 1  0 1 0 1  0\nT -9 0 -9 9 0 -9 0 0 20\n"
     scene = replace(parse_scene(text), environment=default_sky())
@@ -341,7 +342,7 @@ def test_picture_does_not_depend_on_launches(device: Device) -> None:
     assert (tracer.picture() == whole).all()
 
 
-@pytest.mark.matrix(keep=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [8, 4, 1])
 def test_every_packet_width_takes_the_same_samples(device: Device, lanes: int) -> None:
     scene = lit(CAMERA + MATT, spiky(8, 16), samples=2)

@@ -90,6 +90,15 @@ def test_render_imports_what_the_scene_needs_alone(tmp_path: Path, scene: Path) 
     assert again & NOT_FOR_ALL == set()
 
 
+def test_few_triangles_beside_a_kept_tree_do_not_bring_the_kernels_that_build(tmp_path: Path, scene: Path) -> None:
+    scene.write_text(scene.read_text() + "O\nT -9 -2 0 9 -2 0 0 -2 9\nO\n")
+    run = command(str(scene), "-o", str(tmp_path / "picture.png"))
+    for _ in range(2):
+        modules = imported(run, tmp_path)
+        assert "clrt.forest.choose" in modules
+        assert modules & {"clrt.forest.build", "clrt.forest.machine"} == set()
+
+
 def caches(folder: Path) -> dict[str, str]:
     """The environment of a first run ever."""
     return {"XDG_CACHE_HOME": str(folder), "POCL_CACHE_DIR": ""}

@@ -67,6 +67,7 @@ def test_foggy_room_is_that_of_the_reference(lamp: str, fog: str) -> None:
     assert_same(device_batches(scene, 32, range(8)), reference.mean, reference.variance_of_mean)
 
 
+@pytest.mark.slow
 def test_fog_behind_what_lets_light_through_is_that_of_the_reference() -> None:
     pane = "M 0.5 0.5 1  0 1 0 1 0\nopacity 0.5\nT -0.5 1.2 -0.5  0.5 1.2 -0.5  0 1.2 0.5\n"
     scene = parse_scene(ROOM + "L 0.5 1.8 -0.5\nspot 0 1.7 -1  0 -1 0.2  60 softness=0.5\n" + pane + "fog 0.3\n")

@@ -80,6 +80,7 @@ def test_equal_indices_pass_unchanged(device: Device) -> None:
         assert seen == 1.0
 
 
+@pytest.mark.slow
 def test_equal_indices_spawn_no_reflected_ray(device: Device) -> None:
     text = HEAD + "background 1 1 1\n" + GLASS.replace("1.5", "1") + "fresnel\n" + BALL
     stats = clrt.render(parse_scene(text), count=True).stats

@@ -226,6 +226,7 @@ def test_roughness_zero_is_the_polished_mirror(device: Device) -> None:
     assert np.array_equal(clrt.render(scene).pixels, clrt.render(polished).pixels)
 
 
+@pytest.mark.slow
 def test_nearly_polished_shows_what_the_mirror_shows(device: Device) -> None:
     text = ROOM + "M 0.9 0.8 0.7 0.1 0.4 0.3 20 0.6\nGLOSS\n" + BALLS
     mirror, rough = (parse_scene(text.replace("GLOSS", word)) for word in ("", "gloss 0.001"))

@@ -124,6 +124,7 @@ def test_mesh_of_several_nodes_is_kept_once(tmp_path: Path) -> None:
         np.testing.assert_allclose(placed, inner[[0, 2, 1]] * MIRROR, atol=1e-14)
 
 
+@pytest.mark.slow
 def test_shared_mesh_looks_like_copies_of_it(tmp_path: Path) -> None:
     pictures = []
     for shared in (True, False):

@@ -102,7 +102,7 @@ LAMPS = {
 }
 
 
-@pytest.mark.matrix(keep=2)
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("lamp", LAMPS)
 @pytest.mark.parametrize("end", ["indirect\n", "indirect\ndepth 1\n", ""])
 def test_room_is_that_of_the_reference(lamp: str, end: str) -> None:

@@ -170,7 +170,7 @@ def test_environment_chooses_who_builds(device: Device, monkeypatch: pytest.Monk
 @pytest.mark.parametrize("compiled", [False, True])
 def test_size_decides_by_itself(compiled: bool, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(choose.VARIABLE, raising=False)
-    monkeypatch.setattr(choose, "compiled_before", lambda device: compiled)
+    monkeypatch.setattr(machine, "compiled_before", lambda device: compiled)
     assert not choose.on_device("sah", [choose.READY_FROM // 2], device)
     assert choose.on_device("sah", [10, choose.READY_FROM], device) == compiled
     assert choose.on_device("sah", [12] * (choose.READY_FROM // 100), device) == compiled

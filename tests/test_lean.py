@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -75,6 +78,34 @@ def test_picture_is_the_same_with_the_header(name: str, monkeypatch: pytest.Monk
     monkeypatch.setattr(lean, "attempts", _with_header)
     np.testing.assert_array_equal(_picture(name), without)
     assert np.ptp(without) > 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["phong", "gloss", "normalmap", "lens"])
+@pytest.mark.usefixtures("pocl")
+def test_code_is_the_same_with_the_header(name: str, tmp_path: Path) -> None:
+    """Byte for byte what PoCL keeps of the program before it compiles kernels, but for the name of a temporary file."""
+    code = """
+import sys
+from clrt.device import lean, program
+from clrt.device.context import open_device
+from clrt.features import Features
+from clrt.precision import rung
+from clrt.scene.build import load_scene
+if sys.argv[2] == "full":
+    attempts = lean.attempts
+    lean.attempts = lambda folder, source, *, pocl: attempts(folder, source, pocl=False)
+features, ladder = Features.of(load_scene(sys.argv[1])), rung("watertight")
+program.build(open_device(), program.compose(features, ladder, 16, program.Shape(24, 2)))
+"""
+    kept = []
+    for way in ("full", "lean"):  # names of one length: they are in the code
+        environment = os.environ | {kernel_cache.VARIABLE: str(tmp_path / way)}
+        subprocess.run([sys.executable, "-c", code, str(SCENES / f"{name}.txt"), way], env=environment, check=True)
+        (file,) = (tmp_path / way).rglob("program.bc")
+        kept.append(np.frombuffer(file.read_bytes(), np.uint8))
+    assert len(kept[0]) == len(kept[1]) > 20_000
+    assert np.count_nonzero(kept[0] != kept[1]) < 64
 
 
 def test_function_that_is_not_declared_is_compiled_with_the_header(pocl: Device, monkeypatch: pytest.MonkeyPatch) -> None:

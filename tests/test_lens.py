@@ -126,6 +126,7 @@ def test_no_radius_is_a_pinhole() -> None:
     assert "lens" not in sources[0]
 
 
+@pytest.mark.slow
 def test_units_do_not_matter() -> None:
     scene = parse_scene(BOUNCING)
     pixels = clrt.render(scene, samples=2).pixels

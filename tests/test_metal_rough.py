@@ -198,7 +198,7 @@ def test_picture_of_emission_multiplies_what_is_seen_of_it(device: Device) -> No
     np.testing.assert_allclose(clrt.render(behind).pixels[0, 0], [0.2, 0.6, 2.0], rtol=1e-6)
 
 
-@pytest.mark.matrix(keep=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("picture", ["metal_rough_map", "emission_map"])
 def test_pictures_lie_on_an_instance_as_on_the_object(picture: str, device: Device) -> None:
     """A picture of four texels on an object far from where its instance stands: as if the triangles stood there themselves."""

@@ -116,6 +116,7 @@ def test_moving_eye_blurs_by_distance() -> None:
     np.testing.assert_allclose(far, [*[1] * 6, 3 / 4, 1 / 4, *[0] * 8], rtol=0, atol=error)
 
 
+@pytest.mark.slow
 def test_open_for_no_time_is_the_scene_at_that_time() -> None:
     scene = parse_scene(FLAT.replace("shutter 0.25 1", "shutter 0.5 0.5"))
     still = replace(at_time(scene, 0.5), shutter=None)

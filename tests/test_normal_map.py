@@ -68,6 +68,7 @@ def test_every_rung_and_width_matches_reference(write: Write, device: Device, pr
     compare(scene, in_packets(scene, device, lanes, precision))
 
 
+@pytest.mark.slow
 def test_instances_match_reference(write: Write) -> None:
     things = "object piece\n" + TURNED + "O\n" + FLOOR + "instance piece 1.2 0.1 0.3 scale=1.3 turn_z=70\n"
     things += "instance piece 0.5 0.2 0.4 scale_x=0.4 turn_y=50\n"

@@ -82,7 +82,8 @@ def test_every_rung_matches_reference(precision: str) -> None:
     _compare(scene, clrt.render(scene, precision=precision).pixels)
 
 
-@pytest.mark.parametrize("tree", ["sah", pytest.param("median", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("tree", ["sah", "median"])
 def test_monkey_matches_reference(shared_scene: object, tree: str) -> None:
     scene = load_scene(shared_scene("monkey.txt")).with_size(128, 128)  # type: ignore[operator]
     _compare(scene, clrt.render(scene, tree=tree).pixels)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from clrt.scene.model import FloatArray
-from clrt.scene.triangles import components, face_normals, unit
+from clrt.scene.triangles import components, face_normals, scaled, unit
 
 
 def test_components_match_a_flood_fill() -> None:
@@ -103,3 +104,14 @@ def test_unit_vectors_have_length_one_to_four_ulp() -> None:
         assert abs(squared - 1) < Fraction(8, 2**52)
         cosine_of_sides = result[0] * vector[1] - result[1] * vector[0]
         assert abs(cosine_of_sides) <= 4 * 2.0**-52 * max(map(abs, vector))
+
+
+@pytest.mark.parametrize("exponent", [-1060, -1001, -999, 0, 999, 1001, 1020])
+def test_scaling_is_by_powers_of_two_at_any_size(exponent: int) -> None:
+    rng = np.random.default_rng(7)
+    vectors = np.ldexp(rng.uniform(-1, 1, (50, 3)), exponent + rng.integers(-3, 3, (50, 1)))
+    vectors[0, 1] = -0.0
+    for vector, result in zip(vectors.tolist(), scaled(vectors).tolist(), strict=True):
+        shift = math.frexp(max(map(abs, vector)))[1]
+        assert [math.ldexp(x, -shift) for x in vector] == result
+        assert [math.copysign(1, x) for x in vector] == [math.copysign(1, x) for x in result]

@@ -224,7 +224,7 @@ def _rabbit_picture() -> tuple[Scene, ReferencePicture]:
     return scene, clrt.reference.render(scene)
 
 
-@pytest.mark.matrix(keep=1)
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 def test_smooth_rabbit_matches_reference(precision: str) -> None:
     """Bumps, hollows, self-shadows and highlights, with a ball to shadow them: kernel against reference, pixel by pixel."""

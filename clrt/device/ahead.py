@@ -17,7 +17,7 @@ from clrt.device.prepare import LOCAL
 from clrt.device.session import multiple
 from clrt.tasks import Task
 
-_PREPARE = "prepare"  #: launched over all triangles; with zeros for arguments all kernels return at once
+_PREPARE = ("prepare", "prepare_blocks")  #: launched over all triangles; with zeros for arguments all kernels return at once
 _DUMMY_BYTES = 1 << 16  #: more than any struct that a kernel looks into before it returns
 _KERNEL = re.compile(r"^kernel\b[^{;]*?\bvoid (\w+)\(([^)]*)\)", re.M)
 _DIRECTIVE = re.compile(r"^#.*$", re.M)
@@ -42,13 +42,16 @@ def _compile(device: Device, source: str, triangles: int) -> Any:
     if device.info.platform == POCL:
         # PoCL tells small launches from large ones, and compiles for each kind: so the sizes are those of later launches.
         size = multiple(max(1, triangles), LOCAL)
-        sizes = {_PREPARE: ((size,), (LOCAL,))} if triangles else {}
+        sizes = dict.fromkeys(_PREPARE, ((size,), (LOCAL,))) if triangles else {}
         _launch(device, built, source, {"render": (program.LOCAL_SIZE, program.LOCAL_SIZE), **sizes})
     return built
 
 
 def _launch(device: Device, built: Any, source: str, sizes: dict[str, tuple[tuple[int, ...], tuple[int, ...]]]) -> None:
-    """Each kernel with its global and local size, over nothing. One that has an argument of another type is left to its first launch."""
+    """Each kernel with its global and local size, over nothing: with zeros for arguments all return at once.
+
+    One that has an argument of another type is left to its first launch.
+    """
     import pyopencl as cl
 
     queue = cl.CommandQueue(device.context)

@@ -16,8 +16,6 @@ import numpy as np
 
 from clrt.device.context import Device
 from clrt.errors import ClrtError, DeviceError, LimitError
-from clrt.forest.build import build_forest
-from clrt.forest.machine import Machine, compiled_before, is_processor
 from clrt.kdtree import build_tree
 from clrt.kdtree.common import F64, Progress, checked_vertices, default_max_depth
 from clrt.kdtree.tree import KdTree
@@ -57,9 +55,14 @@ def on_device(builder: str, counts: Sequence[int], device: Device) -> bool:
         return False
     if way == "device":
         return True
-    # On anything but a processor a work-item alone, with a subtree to itself, is slow.
     work = sum(counts) + _TREE * len(counts)
-    return is_processor(device) and work >= READY_FROM and (work >= FRESH_FROM or compiled_before(device))
+    if work < READY_FROM:
+        return False
+    # Imported where it is needed, as are the builders: where trees are kept, a few triangles are left for NumPy.
+    from clrt.forest.machine import compiled_before, is_processor
+
+    # On anything but a processor a work-item alone, with a subtree to itself, is slow.
+    return is_processor(device) and (work >= FRESH_FROM or compiled_before(device))
 
 
 def _by_numpy(meshes: Sequence[F64], origins: F64, builder: str, tell: Tell) -> tuple[list[KdTree], list[float]]:
@@ -80,6 +83,9 @@ def _tell_share(tell: Progress, done: float, share: float, fraction: float) -> N
 
 def _by_device(meshes: Sequence[F64], origins: F64, device: Device, tell: Tell) -> tuple[list[KdTree], list[float]]:
     """All trees at once; meshes without triangles are NumPy's."""
+    from clrt.forest.build import build_forest
+    from clrt.forest.machine import Machine
+
     start = time.perf_counter()
     tell(0.0)
     some = [i for i, mesh in enumerate(meshes) if len(mesh)]

@@ -68,6 +68,8 @@ def checked_face_normals(soup: Soup, warnings: list[str]) -> FloatArray:
     flat = ~geometric.any(axis=1)
     note(warnings, soup.lines[flat].tolist(), "the triangle has zero area and is never hit",
          "triangles have zero area and are never hit")  # fmt: skip
+    if not soup.with_normal.any():
+        return geometric
     given = unit(soup.given)
     fits = agreeing(given, geometric)
     wrong = soup.with_normal & ~fits & ~flat
