@@ -41,7 +41,7 @@ HOT int direction_step(real direction, real middle, real steps) {
 HOT void directions_in_steps(global const DirectionBoxes *boxes, const real *lo, const real *minus_hi, Directions *all) {
     global const DirectionScale *scale = (global const DirectionScale *)boxes;
     for (int a = 0; a < 3; a++) {
-        const int some = lo[a] <= (real)1.5;
+        const int some = lo[a] < (real)INFINITY;
         all->lo[a] = some ? (short)(direction_step(lo[a], scale->middle[a], scale->steps) - 2) : (short)SHRT_MAX;
         all->hi[a] = some ? (short)(direction_step(-minus_hi[a], scale->middle[a], scale->steps) + 2) : (short)SHRT_MIN;
     }

@@ -32,23 +32,30 @@ HOT void packet_far(Group *group, int p) {
 }
 
 // The triangles of a block that are left of the group's bounds in `picked`, packet by packet.
-HOT void group_test(const Geometry *geometry, Group *group, global const DirectionBoxes *boxes, uint picked, const int any_hit) {
+HOT void group_test(const Geometry *geometry, Group *group, global const DirectionBoxes *boxes, uint picked, const int shared_origin,
+                    const int any_hit) {
     int tested = 0;
     for (int p = 0; p < group->count; p++) {
         uint met = picked & boxes_met(boxes, group->packet + p, group->packet_far[p]);
         if (!met) continue;
         tested = 1;
         Hits *hits = group->hits + p;
+        const Rays *rays = group->rays + p;
         //@ count_met
-        for (; met; met &= met - 1)
-            triangle_test(geometry, group->rays + p, (real_n)0, boxes->item[first_bit(met)], 1, group->active[p], hits);
+        const real_n reach = shared_origin ? (real_n)0 : rays_reach(rays, geometry->objects + geometry->surfaces[boxes->item[0]].object);
+        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared_origin, group->active[p], hits);
         if (any_hit) group->active[p] &= is_less(hits->slot, NO_LANES);
         packet_far(group, p);
     }
     if (tested) group_far(group);
 }
 
-HOT void group_walk(const Geometry *geometry, Group *group, const int any_hit) {
+HOT void group_ahead(const Geometry *geometry, int slot, const int shared_origin) {
+    if (shared_origin) fetch_ahead(geometry->planes + slot);
+    else fetch_ahead(geometry->triangles + slot);
+}
+
+HOT void group_walk(const Geometry *geometry, Group *group, const int shared_origin, const int any_hit) {
     int stack[GROUP_STACK];
     float near[GROUP_STACK];
     int top = 1, block = 0;
@@ -67,7 +74,7 @@ HOT void group_walk(const Geometry *geometry, Group *group, const int any_hit) {
             global const DirectionBoxes *boxes = geometry->boxes + next;
             met = boxes_met(boxes, &group->all, group->far);
             if (next <= geometry->block_count) {
-                for (uint rest = met; rest; rest &= rest - 1) fetch_ahead(geometry->planes + boxes->item[first_bit(rest)]);
+                for (uint rest = met; rest; rest &= rest - 1) group_ahead(geometry, boxes->item[first_bit(rest)], shared_origin);
             } else {
                 // Onto the stack, the nearest last.
                 for (const int bottom = top; met; met &= met - 1) {
@@ -86,22 +93,52 @@ HOT void group_walk(const Geometry *geometry, Group *group, const int any_hit) {
                 continue;
             }
         }
-        if (block > 0) group_test(geometry, group, geometry->boxes + block, picked, any_hit);
+        if (block > 0) group_test(geometry, group, geometry->boxes + block, picked, shared_origin, any_hit);
         block = met ? next : 0;
         picked = met;
     }
 }
 
-// Bounds of the directions of some packets: the least of each component, and of its negative.
+// Bounds of the directions of a packet, or of what stands for them: the least of each component, and of its negative; +INFINITY of no lanes.
 typedef struct {
     real lo[3], minus_hi[3];
 } Spread;
 
-HOT real spread_size(const Spread *of) {
+// How far apart they are along the first axes.
+HOT real spread_size(const Spread *of, const int axes) {
     real size = 0;
-    for (int a = 0; a < 3; a++)
+    for (int a = 0; a < axes; a++)
         if (-of->minus_hi[a] - of->lo[a] > size) size = -of->minus_hi[a] - of->lo[a];
     return size;
+}
+
+// The most packets from `begin` on, by halves of halves, that are near each other: not farther apart than they are wide. Gives their count and bounds.
+HOT int group_size(const Spread *of, int begin, const int axes, Spread *all) {
+    for (int count = GROUP;; count /= 2) {
+        if (begin % count) continue;
+        real sum = 0;
+        *all = of[begin];
+        for (int p = begin; p < begin + count; p++) {
+            sum += spread_size(of + p, axes);
+            for (int a = 0; a < 3; a++) {
+                all->lo[a] = of[p].lo[a] < all->lo[a] ? of[p].lo[a] : all->lo[a];
+                all->minus_hi[a] = of[p].minus_hi[a] < all->minus_hi[a] ? of[p].minus_hi[a] : all->minus_hi[a];
+            }
+        }
+        if (count == 1 || spread_size(all, axes) <= (sum < SPREAD ? sum : SPREAD)) return count;
+    }
+}
+
+// What is left of packets that go together.
+HOT void group_begin(Group *group, const Rays *rays, Hits *hits, int count) {
+    group->rays = rays;
+    group->hits = hits;
+    group->count = count;
+    for (int p = 0; p < count; p++) {
+        group->active[p] = rays[p].active;
+        packet_far(group, p);
+    }
+    group_far(group);
 }
 
 // A packet that goes alone: one copy for all callers.
@@ -113,40 +150,19 @@ static __attribute__((noinline)) void packet_trace(const Geometry *geometry, con
 static __attribute__((noinline)) void group_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
     Spread of[GROUP];
     for (int p = 0; p < GROUP; p++) least_directions(rays + p, rays[p].active, of[p].lo, of[p].minus_hi);
-    for (int begin = 0, count = GROUP; begin < GROUP; begin += count) {
-        // The most packets from here on, by halves of halves, that are near each other: not farther apart than they are wide.
+    for (int begin = 0, count = 1; begin < GROUP; begin += count) {
         Group group;
         Spread all;
-        for (count = GROUP; ; count /= 2) {
-            if (begin % count) continue;
-            real sum = 0;
-            all = of[begin];
-            for (int p = begin; p < begin + count; p++) {
-                const real wide = spread_size(of + p);
-                if (wide > 0) sum += wide;
-                for (int a = 0; a < 3; a++) {
-                    all.lo[a] = of[p].lo[a] < all.lo[a] ? of[p].lo[a] : all.lo[a];
-                    all.minus_hi[a] = of[p].minus_hi[a] < all.minus_hi[a] ? of[p].minus_hi[a] : all.minus_hi[a];
-                }
-            }
-            if (count == 1 || spread_size(&all) <= (sum < SPREAD ? sum : SPREAD)) break;
-        }
-        if (all.lo[0] > (real)1.5) continue;
-        if (geometry->box_count == 0 || spread_size(&all) > SPREAD) {
+        count = group_size(of, begin, 3, &all);
+        if (all.lo[0] == (real)INFINITY) continue;
+        if (geometry->box_count == 0 || spread_size(&all, 3) > SPREAD) {
             for (int p = begin; p < begin + count; p++) packet_trace(geometry, rays + p, any_hit, hits + p);
             continue;
         }
-        group.rays = rays + begin;
-        group.hits = hits + begin;
-        group.count = count;
-        for (int p = 0; p < count; p++) {
-            directions_in_steps(geometry->boxes, of[begin + p].lo, of[begin + p].minus_hi, group.packet + p);
-            group.active[p] = group.rays[p].active;
-            packet_far(&group, p);
-        }
+        group_begin(&group, rays + begin, hits + begin, count);
+        for (int p = 0; p < count; p++) directions_in_steps(geometry->boxes, of[begin + p].lo, of[begin + p].minus_hi, group.packet + p);
         directions_in_steps(geometry->boxes, all.lo, all.minus_hi, &group.all);
-        group_far(&group);
-        group_walk(geometry, &group, any_hit);
+        group_walk(geometry, &group, 1, any_hit);
         for (int p = 0; p < count; p++) scene_rest(geometry, group.rays + p, group.active[p], 1, any_hit, group.hits + p);
     }
 }

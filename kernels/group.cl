@@ -1,4 +1,4 @@
-// Provides: render_group: GROUP packets of pixels, whose rays from the eye go together.
+// Provides: render_group: GROUP packets of pixels, whose rays from the eye go together; LightsSeen, light_bit: what shines on their hits.
 // Needs: render.cl, frustum.cl.  Reads: GROUP (at most 16, whole rows of 4), PACKET_WIDTH, PACKET_HEIGHT.
 
 //@hook group
@@ -68,4 +68,14 @@ render_group(const int group_column, const int group_row, global const Frame *fr
                  //@ arguments
                  //@ packet_arguments
     );
+//@end
+//@hook geometry_types
+// Which lights shine on the hits of a packet, a bit a light.
+#define LIGHTS_SEEN 31
+
+typedef struct {
+    mask_n known, clear;  // bit i: light i was asked for, and nothing is between
+} LightsSeen;
+
+HOT mask_n light_bit(mask_n of, int i) { return ~is_equal(of & (mask_n)((lane_int)1 << i), NO_LANES); }
 //@end

@@ -1,4 +1,4 @@
-// Provides: LightsSeen: of what the eye sees of a group, which point lights shine on it; group_lights.
+// Provides: group_lights: which point lights shine on what the eye sees of a group.
 // Needs: group.cl, shadow.cl.  Reads: SHADOW_SHARED_ORIGIN (1).
 //
 // Rays from one light to the points that a group sees go together, as those of the eye do. What is found is kept a bit a light; lanes for which
@@ -29,13 +29,6 @@ HOT void group_lights(const Geometry *geometry, global const Light *lights, int 
     }
 }
 
-//@hook geometry_types
-#define LIGHTS_SEEN 31
-
-typedef struct {
-    mask_n known, clear;  // bit i: light i was asked for, and nothing is between
-} LightsSeen;
-//@end
 //@hook geometry_members
     global const DirectionBoxes *light_boxes;  // box_count a light
     const LightsSeen *lights_seen;             // of the hits that the eye sees; or 0
@@ -68,9 +61,9 @@ typedef struct {
 //@end
 //@hook visible_known
         if (geometry->lights_seen && i < LIGHTS_SEEN) {
-            const mask_n bit = (mask_n)((lane_int)1 << i), known = lit & ~is_equal(geometry->lights_seen->known & bit, NO_LANES);
+            const mask_n known = lit & light_bit(geometry->lights_seen->known, i);
             //@counting count_rays(geometry->counters, COUNT_SHADOW, known);
-            clear = known & ~is_equal(geometry->lights_seen->clear & bit, NO_LANES);
+            clear = known & light_bit(geometry->lights_seen->clear, i);
             lit &= ~known;
         }
 //@end

@@ -1,10 +1,11 @@
-// Provides: reach_clear: which hit points see all the way in a direction; reach_point: which see a point.
+// Provides: reach_rays; reach_clear: which hit points see all the way in a direction; reach_point: which see a point.
 // Needs: scene.cl, hit.cl, structs.  Reads: nothing.
 
 // Rays from the points, as reflected ones are: they start off the surface by the point's error and pass by the triangle that they start on;
 // the first thing they meet settles it. With `ends`, they end at `end`, short of it by `short_by`, the error there along the way; else nowhere.
-HOT mask_n reach_trace(const Geometry *geometry, const Rays *rays, const Hit *hit, const real_n *to_light, const int ends, const real_n *end,
-                       real_n short_by, const int from_eye, real extent, mask_n lit) {
+// Gives the lanes that are traced: those of `lit` that are not at the end already.
+HOT mask_n reach_rays(const Geometry *geometry, const Rays *rays, const Hit *hit, const real_n *to_light, const int ends, const real_n *end,
+                      real_n short_by, const int from_eye, real extent, mask_n lit, Rays *from_hits, Hits *none) {
     Rays towards;
     real_n start[3] = {hit->point[0], hit->point[1], hit->point[2]}, error = hit->error;
     mask_n own = load_lanes(hit->slot);
@@ -31,6 +32,16 @@ HOT mask_n reach_trace(const Geometry *geometry, const Rays *rays, const Hit *hi
     hits.t = t_max;
     hits.slot = (mask_n)-1;
     //@ hits_begin
+    *from_hits = towards;
+    *none = hits;
+    return lit;
+}
+
+HOT mask_n reach_trace(const Geometry *geometry, const Rays *rays, const Hit *hit, const real_n *to_light, const int ends, const real_n *end,
+                       real_n short_by, const int from_eye, real extent, mask_n lit) {
+    Rays towards;
+    Hits hits;
+    lit = reach_rays(geometry, rays, hit, to_light, ends, end, short_by, from_eye, extent, lit, &towards, &hits);
     //@ reach_limit
     scene_trace(geometry, &towards, 0, 1, &hits);
     //@counting count_rays(geometry->counters, COUNT_SHADOW, towards.active);

@@ -12,7 +12,7 @@ from clrt.device.arrays_wide import wide_trees
 from clrt.device.session import Buffers, multiple
 
 LOCAL = 64
-_TRIANGLES, _PLANES, _DIRECTIONS, _UNIONS = map(np.int32, range(4))
+_TRIANGLES, _PLANES, _DIRECTIONS, _UNIONS, _PLACES = map(np.int32, range(5))
 _OUTERMOST = 32000  #: steps to the direction farthest from the middle: an int16 holds all
 
 
@@ -51,33 +51,53 @@ class _Launches:
             for i, light in enumerate(self.lights):
                 self._launch(_PLANES, packed.slots, light, i * packed.slots, packed.slots, planes=buffers.effects["light_planes"])
         if buffers.boxes and buffers.box_count:
-            self._directions(self.eye, buffers.boxes[0], 0)
-            for i, light in enumerate(self.lights if len(buffers.boxes) > 1 else ()):
-                self._directions(light, buffers.boxes[1], i * buffers.box_count)
+            self._directions(self.eye, buffers.boxes["eye"], 0)
+            for i, light in enumerate(self.lights if "lights" in buffers.boxes else ()):
+                self._directions(light, buffers.boxes["lights"], i * buffers.box_count)
+            for i, sun in enumerate(packed.scene.suns if "suns" in buffers.boxes else ()):
+                self._places(np.asarray(sun.direction), buffers.boxes["suns"], i * buffers.box_count)
 
     def _launch(self, what: np.int32, items: int, origin: NDArray[np.float64], first: int, end: int, *, planes: Any = None, offset: int = 0,
                 of_boxes: tuple[Any, ...] = ()) -> None:  # fmt: skip
         buffers = self.buffers
         if buffers.boxes and not of_boxes:
-            of_boxes = self._of_boxes(np.zeros(4, np.float32), buffers.boxes[0])
+            of_boxes = self._of_boxes(np.zeros(4, np.float32), buffers.boxes["eye"])
         size = (multiple(max(items, self.least), LOCAL),)
         records = buffers.triangles, buffers.eye_planes if planes is None else planes
         given = what, buffers.vertices, np.array([*origin, 0.0]), *records, np.int32(first), np.int32(end), *of_boxes
         self.kernel(buffers.device.queue, size, (LOCAL,), *given, global_offset=(offset,))
 
-    def _of_boxes(self, scale: NDArray[np.float32], boxes: Any, below: int = 0, count: int = 0) -> tuple[Any, ...]:
-        return self.blocks, scale, boxes, np.int32(below), np.int32(count)
+    def _of_boxes(
+        self, scale: NDArray[np.float32], boxes: Any, below: int = 0, count: int = 0, frame: NDArray[np.float32] | None = None
+    ) -> tuple[Any, ...]:
+        given = self.blocks, scale, boxes, np.int32(below), np.int32(count)
+        if "suns" not in self.buffers.boxes:
+            return given
+        axes = self.buffers.upload(np.zeros(13, np.float32) if frame is None else frame)
+        return *given, axes, np.array([*self.buffers.packed.origin, 0.0])
 
     def _directions(self, origin: NDArray[np.float64], boxes: Any, first: int) -> None:
-        """Of blocks, then level by level of the records above them."""
-        packed, levels = self.buffers.packed, self.buffers.box_levels
+        """Of blocks, then of the records above them."""
+        packed = self.buffers.packed
+        items = self.buffers.box_levels[0] * layout.BOXES
         scale = direction_scale(origin - packed.origin, packed.objects)
-        items = levels[0] * layout.BOXES
         self._launch(_DIRECTIONS, items, origin, first, items, of_boxes=self._of_boxes(scale, boxes))
+        self._unions(boxes, first)
+
+    def _places(self, direction: NDArray[np.float64], boxes: Any, first: int) -> None:
+        """As seen along a sun's direction."""
+        packed = self.buffers.packed
+        items = self.buffers.box_levels[0] * layout.BOXES
+        frame = place_frame(direction, packed.objects)
+        self._launch(_PLACES, items, self.eye, first, items, of_boxes=self._of_boxes(frame[:4], boxes, frame=frame))
+        self._unions(boxes, first)
+
+    def _unions(self, boxes: Any, first: int) -> None:
+        """Level by level."""
         below = 1
-        for count in levels[:-1]:
+        for count in self.buffers.box_levels[:-1]:
             items = multiple(count, layout.BOXES)
-            self._launch(_UNIONS, items, origin, first, items, of_boxes=self._of_boxes(scale, boxes, below, count))
+            self._launch(_UNIONS, items, self.eye, first, items, of_boxes=self._of_boxes(np.zeros(4, np.float32), boxes, below, count))
             below += count
 
     def _single_rays(self) -> None:
@@ -109,3 +129,13 @@ def direction_scale(origin: NDArray[np.float64], objects: NDArray[np.void]) -> N
         return np.array([0, 0, 0, _OUTERMOST], np.float32)
     farthest = max(2 * np.sin(np.arcsin(radius / distance) / 2), 1e-6)
     return np.array([*(to_middle / distance), _OUTERMOST / farthest], np.float32)
+
+
+def place_frame(direction: NDArray[np.float64], objects: NDArray[np.void]) -> NDArray[np.float32]:
+    """(13,): the middle of all objects, steps a unit of length, and three axes at right angles, the last along `direction` (group_sun.cl)."""
+    lo, hi = objects["lo"].min(0).astype(np.float64), objects["hi"].max(0).astype(np.float64)
+    radius = max(np.linalg.norm(hi - lo) / 2, 1e-30)
+    along = direction / np.linalg.norm(direction)
+    across = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    across /= np.linalg.norm(across)
+    return np.concatenate([(lo + hi) / 2, [_OUTERMOST / radius], across, np.cross(along, across), along]).astype(np.float32)

@@ -116,6 +116,12 @@ def lights_grouped(features: Features, lanes: int, shape: Shape) -> bool:
     return shape.groups and lanes > 1 and shape.shared_lights and "shadows" in names and names.isdisjoint(others)
 
 
+def suns_grouped(features: Features, lanes: int, shape: Shape) -> bool:
+    """The same of rays to suns (group_sun.cl)."""
+    names = {f.name for f in features.active}
+    return shape.groups and lanes > 1 and "sun shadows" in names and names.isdisjoint(("opacity shadows", "fog"))
+
+
 def item_size(lanes: int, groups: bool) -> tuple[int, int]:
     """Pixels of a work-item of `render`: width and height."""
     width, height = PACKETS[lanes]
@@ -234,6 +240,7 @@ def _files(features: Features, precision: Precision, lanes: int, shape: Shape, e
     yield from (f.kernel for f in features.active if not f.early)
     yield from ("group.cl",) if together else ()
     yield from ("group_shadow.cl",) if together and lights_grouped(features, lanes, shape) else ()
+    yield from ("group_sun.cl",) if together and suns_grouped(features, lanes, shape) else ()
     yield from after
 
 

@@ -73,7 +73,8 @@ class Buffers:
         with_shadows = any(name == "light_planes" for f in features.active for name, _ in f.parameters)
         if with_shadows:
             self.effects["light_planes"] = self.empty(self.plane_bytes * (max(1, lights) if self.shared_lights else 1))
-        self.boxes = self._boxes() if self.groups else []  #: of directions, as seen from the eye, then as from all lights
+#: boxes of directions as seen from the eye, of those from all lights, and along all suns, where the program reads them
+        self.boxes: dict[str, Any] = self._boxes() if self.groups else {}
 
     @property
     def wide_stack(self) -> int:
@@ -84,7 +85,7 @@ class Buffers:
     def size(self) -> int:
         """Bytes of all buffers: the scene's, and those of effects."""
         own = (self.frame, self.vertices, self.triangles, self.eye_planes)
-        return sum(b.size for b in (*own, *self.core, *self.effects.values(), *self.boxes))
+        return sum(b.size for b in (*own, *self.core, *self.effects.values(), *self.boxes.values()))
 
     @property
     def box_levels(self) -> list[int]:
@@ -100,12 +101,16 @@ class Buffers:
         """All of them, and the one in front of them that tells how directions are measured; or 0."""
         return 1 + sum(self.box_levels) if self.box_levels else 0
 
-    def _boxes(self) -> list[Any]:
-        """Room for the boxes of directions that the program reads."""
-        shape = program.Shape(0, shared_lights=self.shared_lights, groups=True)
-        lights = program.lights_grouped(self.features, self.lanes, shape)
+    def _boxes(self) -> dict[str, Any]:
+        """Room for them, in the order of the program's arguments."""
+        shape, scene = program.Shape(0, shared_lights=self.shared_lights, groups=True), self.packed.scene
+        counts = {"eye": 1}
+        if program.lights_grouped(self.features, self.lanes, shape):
+            counts["lights"] = len(scene.lights_with_position)
+        if program.suns_grouped(self.features, self.lanes, shape):
+            counts["suns"] = len(scene.suns)
         size = max(1, self.box_count) * layout.direction_boxes().itemsize
-        return [self.empty(size * n) for n in ([1, len(self.packed.scene.lights_with_position)] if lights else [1])]
+        return {name: self.empty(size * n) for name, n in counts.items()}
 
     def _check_memory(self) -> None:
         need, there = self.plane_bytes * 4, self.device.handle.global_mem_size
@@ -179,8 +184,8 @@ class Tracer:
         if self.stages is not None:
             self._after += (self.stages.buffer,)
         if buffers.boxes:
-            eye_boxes, *light_boxes = buffers.boxes
-            self._after += (eye_boxes, np.int32(len(buffers.packed.blocks)), np.int32(buffers.box_count), *light_boxes)
+            eye_boxes, *other_boxes = buffers.boxes.values()
+            self._after += (eye_boxes, np.int32(len(buffers.packed.blocks)), np.int32(buffers.box_count), *other_boxes)
 
     def begin_samples(self, first: int, end: int) -> None:
         """The next rows are those of samples [first, end), which are added to the ones before them. For scenes that are sampled."""
