@@ -3,11 +3,11 @@
 Independent of the builders: triangles are followed from the root with the separating-axis test of overlap.py, never by clipping.
 
 What "reaches" means. Let delta = 2^-40 * (the triangle's greatest |coordinate|), or the least number there is: far above the rounding of
-float64, far below that of float32. A triangle that reaches farther than delta beyond a split, within the part of the cell where it
-was followed to, must be found on that side. If it reaches farther than delta to neither side, as when it lies flat in the plane, it must be found on at least
-one of the two, whole. A triangle that only touches a side within delta may be there or not: a ray that hits it there passes
-within rounding of the plane, where traversal visits both sides. So the proof is an and-or tree over pairs of triangle and
-node, with the entries of leaves as its facts.
+float64, far below that of float32. A triangle that reaches farther than delta beyond a split, within the part of the cell where it was
+followed to, must be found on that side. If it reaches farther than delta to neither side, as when it lies flat in the plane, it must be
+found on at least one of the two, whole. A triangle that only touches a side within delta may be there or not: a ray that hits it there
+passes within rounding of the plane, where traversal visits both sides. So the proof is an and-or tree over pairs of triangle and node,
+with the entries of leaves as its facts.
 """
 
 from __future__ import annotations
