@@ -259,7 +259,7 @@ def test_brute_force_leaves_no_test_out(grouped: None) -> None:
 
 @pytest.mark.parametrize("precision", ["watertight", "exact"])
 def test_rays_to_suns_go_together_as_alone(precision: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """One sun from the side, one behind the eye, one that grazes; and a floor far greater than the scene, from which rays start far away."""
+    """One sun from the side, one behind the eye, one that grazes; and a floor far greater than the scene: rays start far away."""
     floor = "T -900 -1.5 -900  -900 -1.5 900  900 -1.5 900"
     scene = soup_scene(700, "sun 1 2 -1", "sun 0 0 -1", "sun 1 0.02 0", floor)
     together, alone = (picture(scene, monkeypatch, way, precision=precision, count=True) for way in (True, False))

@@ -132,7 +132,7 @@ def direction_scale(origin: NDArray[np.float64], objects: NDArray[np.void]) -> N
 
 
 def place_frame(direction: NDArray[np.float64], objects: NDArray[np.void]) -> NDArray[np.float32]:
-    """(13,): the middle of all objects, steps a unit of length, and three axes at right angles, the last along `direction` (group_sun.cl)."""
+    """(13,): the middle of all objects, steps a unit of length, three axes at right angles, the last along `direction` (group_sun.cl)."""
     lo, hi = objects["lo"].min(0).astype(np.float64), objects["hi"].max(0).astype(np.float64)
     radius = max(np.linalg.norm(hi - lo) / 2, 1e-30)
     along = direction / np.linalg.norm(direction)
