@@ -55,7 +55,7 @@ def _visible(scene: Scene, device: Device, precision: str) -> tuple[np.ndarray, 
     seen = np.rint(tracer.picture()[..., 0] * 2**16).astype(np.int64).ravel() - 1
     directions = np.empty((scene.camera.width * scene.camera.height, 3), np.float32)
     out = buffers.empty(directions.nbytes)
-    width, height = program.PACKETS[tracer.lanes]
+    width, height = program.PACKETS[buffers.lanes]
     kernel = cl.Kernel(program.build(device, source + PROBE), "probe")
     kernel(device.queue, (scene.camera.width // width, scene.camera.height // height), None, buffers.frame, out)
     cl.enqueue_copy(device.queue, directions, out)
