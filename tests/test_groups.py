@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from clrt import renderer
-from clrt.device import layout, program
+from clrt.device import layout, program, session
 from clrt.device.context import Device
 from clrt.device.pack import local_origin
 from clrt.device.prepare import direction_scale, place_frame, prepare
@@ -268,6 +268,14 @@ def test_rays_to_suns_go_together_as_alone(precision: str, monkeypatch: pytest.M
     assert different == 0 if precision == "exact" else different <= 3  # of watertight, edges may be wider by their rounding
     dark = picture(soup_scene(700, floor), monkeypatch, True)
     assert (np.abs(dark.pixels - together.pixels).max(2) > 0.05).mean() > 0.1
+
+
+def test_packets_go_alone_where_the_device_has_no_room_for_boxes(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = soup_scene(900)
+    there = session.Buffers._box_levels
+    alone = picture(scene, monkeypatch, False)
+    monkeypatch.setattr(session.Buffers, "_box_levels", lambda buffers: [device.handle.max_mem_alloc_size // 256, *there(buffers)])
+    np.testing.assert_array_equal(picture(scene, monkeypatch, True).pixels, alone.pixels)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (5, 3), (17, 9), (33, 40)])

@@ -73,8 +73,12 @@ class Buffers:
         with_shadows = any(name == "light_planes" for f in features.active for name, _ in f.parameters)
         if with_shadows:
             self.effects["light_planes"] = self.empty(self.plane_bytes * (max(1, lights) if self.shared_lights else 1))
-#: boxes of directions as seen from the eye, of those from all lights, and along all suns, where the program reads them
-        self.boxes: dict[str, Any] = self._boxes() if self.groups else {}
+        #: boxes of directions as seen from the eye, of those from all lights, and along all suns, where the program reads them; where the
+        #: device has no room for them there are no levels of them, and packets go alone
+        self.box_levels: list[int] = []
+        self.boxes: dict[str, Any] = {}
+        if self.groups:
+            self.box_levels, self.boxes = self._boxes()
 
     @property
     def wide_stack(self) -> int:
@@ -88,29 +92,32 @@ class Buffers:
         return sum(b.size for b in (*own, *self.core, *self.effects.values(), *self.boxes.values()))
 
     @property
-    def box_levels(self) -> list[int]:
-        """Records of boxes as seen from one origin: blocks, records of 16 of those, and so on to one. None where trees have but a leaf."""
+    def box_count(self) -> int:
+        """Records of boxes as seen from one origin, and the one in front of them that tells how directions are measured; or 0."""
+        return 1 + sum(self.box_levels) if self.box_levels else 0
+
+    def _boxes(self) -> tuple[list[int], dict[str, Any]]:
+        """How many records each level has as seen from one origin, and room for those of all, in the order of the program's arguments."""
+        shape, scene = program.Shape(0, shared_lights=self.shared_lights, groups=True), self.packed.scene
+        origins = {"eye": 1}
+        if program.lights_grouped(self.features, self.lanes, shape):
+            origins["lights"] = len(scene.lights_with_position)
+        if program.suns_grouped(self.features, self.lanes, shape):
+            origins["suns"] = len(scene.suns)
+        levels, record = self._box_levels(), layout.direction_boxes().itemsize
+        size = (1 + sum(levels)) * record
+        room = self.device.handle
+        if size * max(origins.values()) > room.max_mem_alloc_size or size * sum(origins.values()) > room.global_mem_size // 4:
+            levels, size = [], record
+        return levels, {name: self.empty(size * n) for name, n in origins.items()}
+
+    def _box_levels(self) -> list[int]:
+        """Blocks, records of 16 of those, and so on to one; none where trees have but a leaf, so that every ray meets all triangles."""
         split = len(self.packed.nodes) > len(self.packed.objects)
         levels = [len(self.packed.blocks)] if split and len(self.packed.blocks) else []
         while levels and levels[-1] > 1:
             levels.append(-(-levels[-1] // layout.BOXES))
         return levels
-
-    @property
-    def box_count(self) -> int:
-        """All of them, and the one in front of them that tells how directions are measured; or 0."""
-        return 1 + sum(self.box_levels) if self.box_levels else 0
-
-    def _boxes(self) -> dict[str, Any]:
-        """Room for them, in the order of the program's arguments."""
-        shape, scene = program.Shape(0, shared_lights=self.shared_lights, groups=True), self.packed.scene
-        counts = {"eye": 1}
-        if program.lights_grouped(self.features, self.lanes, shape):
-            counts["lights"] = len(scene.lights_with_position)
-        if program.suns_grouped(self.features, self.lanes, shape):
-            counts["suns"] = len(scene.suns)
-        size = max(1, self.box_count) * layout.direction_boxes().itemsize
-        return {name: self.empty(size * n) for name, n in counts.items()}
 
     def _check_memory(self) -> None:
         need, there = self.plane_bytes * 4, self.device.handle.global_mem_size
