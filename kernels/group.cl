@@ -1,5 +1,5 @@
 // Provides: render_group: GROUP packets of pixels, whose rays from the eye go together; LightsSeen, light_bit: what shines on their hits.
-// Needs: render.cl, frustum.cl.  Reads: GROUP (at most 16, whole rows of 4), PACKET_WIDTH, PACKET_HEIGHT.
+// Needs: render.cl, group_trace.cl.  Reads: GROUP (at most 16, whole rows of 4), LIGHTS_SEEN (at most 31), PACKET_WIDTH, PACKET_HEIGHT.
 
 //@hook group
 // Where a packet is in its group, in Morton order: packets in a row are near each other.
@@ -71,7 +71,6 @@ render_group(const int group_column, const int group_row, global const Frame *fr
 //@end
 //@hook geometry_types
 // Which lights shine on the hits of a packet, a bit a light.
-#define LIGHTS_SEEN 31
 
 typedef struct {
     mask_n known, clear;  // bit i: light i was asked for, and nothing is between

@@ -6,7 +6,7 @@
 // So records of boxes are as those of directions (directions.cl), of places in units of half the scene's size from its middle, and picked
 // triangles are tested as those of any rays are. Places of triangles are computed in float64 with the axes as they were rounded; those of rays
 // are off by the rounding of p - m, of products and sums, below 8u (|p| + |m|) in each axis, and by D.A, D.B, which are below 2^-23, over the
-// way through the scene: a hundredth of a step.
+// way from p to the triangles: 2^-20 (|p| + |m|) holds both, with u = 2^-24 or less; and the way on through them is a hundredth of a step.
 #define PREPARE_PLACES 4
 
 typedef struct {
@@ -48,8 +48,8 @@ HOT void least_places(global const PlaceFrame *frame, const Rays *rays, real *lo
     for (int axis = 0; axis < 3; axis++) {
         real_n place = (real_n)0;
         for (int a = 0; a < 3; a++) place += from_middle[a] * (real_n)frame->axes[axis][a];
-        lo[axis] = least_lane(choose(rays->active, (place - R(16.0) * UNIT_ROUNDOFF * size) * unit, (real_n)INFINITY));
-        minus_hi[axis] = least_lane(choose(rays->active, (-place - R(16.0) * UNIT_ROUNDOFF * size) * unit, (real_n)INFINITY));
+        lo[axis] = least_lane(choose(rays->active, (place - R(0x1p-20) * size) * unit, (real_n)INFINITY));
+        minus_hi[axis] = least_lane(choose(rays->active, (-place - R(0x1p-20) * size) * unit, (real_n)INFINITY));
     }
     minus_hi[2] = R(-2.0);
 }
@@ -71,7 +71,7 @@ static __attribute__((noinline)) void sun_trace(const Geometry *geometry, const 
         Group group;
         Spread all;
         count = group_size(of, begin, 2, &all);
-        if (all.lo[0] == (real)INFINITY) continue;
+        if (!group_lives(rays + begin, count)) continue;
         if (geometry->box_count == 0 || spread_size(&all, 2) > SPREAD) {
             for (int p = begin; p < begin + count; p++) scene_trace(geometry, rays + p, 0, 1, hits + p);
             continue;

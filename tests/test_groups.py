@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from device_pictures import in_packets
 from numpy.typing import NDArray
 
 from clrt import renderer
@@ -217,7 +218,7 @@ def test_every_point_of_a_triangle_is_in_its_box_along_a_sun(grouped: None, devi
 @pytest.mark.matrix(keep=3)
 @pytest.mark.parametrize("path", sorted(SCENES.glob("*.txt")), ids=lambda path: path.stem)
 def test_picture_of_packets_together_is_that_of_packets_alone(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On the rung `exact` each picture is one, whatever way rays go."""
+    """On the rung `exact` each ray meets one triangle, whatever way it goes; coincident ones aside, at a distance of the same bits."""
     scene = load_scene(path)
     options = {"size": (36, 28), "precision": "exact", "samples": 2 if scene.samples > 1 else None}
     together, alone = (picture(scene, monkeypatch, way, **options) for way in (True, False))
@@ -235,7 +236,8 @@ def test_soup_is_seen_together_as_alone(precision: str, monkeypatch: pytest.Monk
 
 @pytest.mark.parametrize("eye", EYES[1:])
 def test_eye_amidst_or_far_from_triangles(eye: tuple[float, float, float], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Directions all around, and pictures of a scene that is small in them. There the interval of t depends on what was met before."""
+    """Directions all around, and pictures of a scene that is small in them. There the interval that t lies in
+    depends on what was met before: float32 tells less of it than float64, which is asked only where float32 leaves a doubt."""
     to = -np.array(eye)
     field = 150 if np.linalg.norm(to) < 0.5 else 0.01 if np.linalg.norm(to) > 10 else 60
     camera = f"E {eye[0]} {eye[1]} {eye[2]}\nV {to[0]} {to[1]} {to[2]}\nF {field}\n"
@@ -268,6 +270,43 @@ def test_rays_to_suns_go_together_as_alone(precision: str, monkeypatch: pytest.M
     assert different == 0 if precision == "exact" else different <= 3  # of watertight, edges may be wider by their rounding
     dark = picture(soup_scene(700, floor), monkeypatch, True)
     assert (np.abs(dark.pixels - together.pixels).max(2) > 0.05).mean() > 0.1
+
+
+def test_shadow_of_a_mesh_on_a_sphere_far_behind_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rays to the sun start 10^7 times as far away as the scene is large: on `double`, whose rounding is far below that of axes."""
+    far = 1e7
+    to_sun = np.array([1.0, 2.0, -1.0]) / np.sqrt(6.0)
+    near, side = -far * to_sun, np.cross(to_sun, [0.0, 1.0, 0.0])
+    center, eye = near - far * to_sun, near + 3.0 * to_sun + side
+    text = lambda values: " ".join(map(repr, values.tolist()))  # noqa: E731
+    lines = [f"E {text(eye)}", f"V {text(near - eye)}", "F 45", "R 160 120", "sun 1 2 -1"]
+    lines += ["M 1 1 1  0 1 0 1  0", f"S {text(center)} {far!r}"]
+    lines += ["T " + "  ".join(" ".join(f"{x:.6f}" for x in corner) for corner in t) for t in soup(500)]
+    scene = parse_scene("\n".join([*lines, "O", ""]))
+    together, alone = (picture(scene, monkeypatch, way, precision="double") for way in (True, False))
+    assert 0.05 < (alone.pixels[..., 0] == 0).mean() < 0.95  # there is a shadow
+    assert ((together.pixels - alone.pixels) > 0.01).sum() == 0
+
+
+def test_more_lights_and_suns_than_go_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(9)
+    around = [f"L {x:.3f} {y:.3f} {z:.3f} 0.05 0.05 0.05" for x, y, z in random.uniform(-4.0, 4.0, (34, 3))]
+    suns = [f"sun {x:.3f} {y:.3f} {z:.3f} intensity=0.05" for x, y, z in random.uniform(-1.0, 1.0, (33, 3))]
+    scene = soup_scene(300, *around, *suns)
+    options = {"size": (20, 15), "precision": "exact", "count": True}
+    together, alone = (picture(scene, monkeypatch, way, **options) for way in (True, False))
+    np.testing.assert_array_equal(together.pixels, alone.pixels)
+    assert together.stats.ray_counts == alone.stats.ray_counts
+
+
+@pytest.mark.parametrize("lanes", [4, 8])
+def test_narrow_packets_together(lanes: int, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = soup_scene(500, "sun 1 2 -1")
+    pictures = []
+    for least in (1, _ALONE):
+        monkeypatch.setattr(program, "GROUPS_FROM", least)
+        pictures.append(in_packets(scene, device, lanes, "exact"))
+    np.testing.assert_array_equal(*pictures)
 
 
 def test_packets_go_alone_where_the_device_has_no_room_for_boxes(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:

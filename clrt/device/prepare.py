@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device import kernel_cache, layout
+from clrt.device import kernel_cache, layout, program
 from clrt.device.arrays_wide import wide_trees
 from clrt.device.session import Buffers, multiple
 
@@ -52,9 +52,9 @@ class _Launches:
                 self._launch(_PLANES, packed.slots, light, i * packed.slots, packed.slots, planes=buffers.effects["light_planes"])
         if buffers.boxes and buffers.box_count:
             self._directions(self.eye, buffers.boxes["eye"], 0)
-            for i, light in enumerate(self.lights if "lights" in buffers.boxes else ()):
+            for i, light in enumerate(self.lights[: program.LIGHTS_SEEN] if "lights" in buffers.boxes else ()):
                 self._directions(light, buffers.boxes["lights"], i * buffers.box_count)
-            for i, sun in enumerate(packed.scene.suns if "suns" in buffers.boxes else ()):
+            for i, sun in enumerate(packed.scene.suns[: program.LIGHTS_SEEN] if "suns" in buffers.boxes else ()):
                 self._places(np.asarray(sun.direction), buffers.boxes["suns"], i * buffers.box_count)
 
     def _launch(self, what: np.int32, items: int, origin: NDArray[np.float64], first: int, end: int, *, planes: Any = None, offset: int = 0,

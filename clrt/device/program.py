@@ -41,6 +41,7 @@ PACKETS = {16: (4, 4), 8: (4, 2), 4: (2, 2), 1: (1, 1)}  #: lanes -> pixels of a
 TILE = (16, 8)  #: pixels of a tile, width and height: whole packets of any size
 GROUP = (4, 2)  #: packets of a work-item that go together, across and down
 GROUPS_FROM = 256  #: triangles; measured: with few, the rest of the work is as much as the tests that are saved
+LIGHTS_SEEN = 31  #: lights, and suns, whose shadow rays from what the eye sees go together: a bit of an int each
 GROUP_STACK = 15 * 7 + 1  #: entries: for 7 levels of records, more than 2^27 blocks have
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
@@ -189,7 +190,7 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     names = {f.name for f in features.active}
     values |= dict(zip(("ITEM_WIDTH", "ITEM_HEIGHT"), item_size(lanes, shape.groups), strict=True))
     if shape.groups and lanes > 1:
-        values |= {"GROUP": GROUP[0] * GROUP[1], "BOXES": layout.BOXES, "GROUP_STACK": GROUP_STACK}
+        values |= {"GROUP": GROUP[0] * GROUP[1], "BOXES": layout.BOXES, "GROUP_STACK": GROUP_STACK, "LIGHTS_SEEN": LIGHTS_SEEN}
     if "single rays" in names:
         values |= {"BLOCK": block_width(lanes), "WIDE_STACK": shape.wide}
     if "sampling" in names:
@@ -236,7 +237,7 @@ def _files(features: Features, precision: Precision, lanes: int, shape: Shape, e
     yield from precision.surface_kernels if "hit.cl" in before else ()
     yield from (f.kernel for f in features.active if f.early and not f.replaces)
     yield from (instead.get(name, name) for name in between)
-    yield from ("frustum.cl",) if together else ()
+    yield from ("group_trace.cl",) if together else ()
     yield from (f.kernel for f in features.active if not f.early)
     yield from ("group.cl",) if together else ()
     yield from ("group_shadow.cl",) if together and lights_grouped(features, lanes, shape) else ()

@@ -101,9 +101,9 @@ class Buffers:
         shape, scene = program.Shape(0, shared_lights=self.shared_lights, groups=True), self.packed.scene
         origins = {"eye": 1}
         if program.lights_grouped(self.features, self.lanes, shape):
-            origins["lights"] = len(scene.lights_with_position)
+            origins["lights"] = min(len(scene.lights_with_position), program.LIGHTS_SEEN)
         if program.suns_grouped(self.features, self.lanes, shape):
-            origins["suns"] = len(scene.suns)
+            origins["suns"] = min(len(scene.suns), program.LIGHTS_SEEN)
         levels, record = self._box_levels(), layout.direction_boxes().itemsize
         size = (1 + sum(levels)) * record
         room = self.device.handle

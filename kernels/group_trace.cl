@@ -3,10 +3,10 @@
 //
 // The rays of a group are bounded by one interval of directions; as all start at one point, that is all there is to know of them. Records of 16
 // boxes, of blocks of triangles or of other records, are compared with it at once, from near to far: those are the kd-tree's triangles in
-// the order of its leaves, each once (packed.py). Of the blocks that are met, the triangles are picked first for the group, then for each packet.
+// the order of the leaves, each once (clrt/kdtree/runs.py). Of the blocks that are met, the triangles are picked first for the group, then for each packet.
 //
 // What a ray meets lies in all boxes above it, so nothing is missed. Of hits at equal t the one of the first triangle stays here and in kdtree.cl
-// (`tie`), so both find the same.
+// (`tie`), so both find the same, but for what only the error bounds of a test let in: there it matters which triangles are tested at all.
 #define SPREAD R(0.06)  // of directions, in a group that goes together: wider ones meet too many boxes by their corners
 
 // The packets of a group, and what is left of them.
@@ -104,7 +104,7 @@ typedef struct {
     real lo[3], minus_hi[3];
 } Spread;
 
-// How far apart they are along the first axes.
+// How far apart they are along the first axes: all three of directions, those across a sun's.
 HOT real spread_size(const Spread *of, const int axes) {
     real size = 0;
     for (int a = 0; a < axes; a++)
@@ -127,6 +127,12 @@ HOT int group_size(const Spread *of, int begin, const int axes, Spread *all) {
         }
         if (count == 1 || spread_size(all, axes) <= (sum < SPREAD ? sum : SPREAD)) return count;
     }
+}
+
+HOT int group_lives(const Rays *rays, int count) {
+    mask_n some = NO_LANES;
+    for (int p = 0; p < count; p++) some |= rays[p].active;
+    return any_lane(some);
 }
 
 // What is left of packets that go together.
@@ -154,7 +160,7 @@ static __attribute__((noinline)) void group_trace(const Geometry *geometry, cons
         Group group;
         Spread all;
         count = group_size(of, begin, 3, &all);
-        if (all.lo[0] == (real)INFINITY) continue;
+        if (!group_lives(rays + begin, count)) continue;
         if (geometry->box_count == 0 || spread_size(&all, 3) > SPREAD) {
             for (int p = begin; p < begin + count; p++) packet_trace(geometry, rays + p, any_hit, hits + p);
             continue;
