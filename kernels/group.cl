@@ -1,4 +1,4 @@
-// Provides: render_group: GROUP packets of pixels, whose rays from the eye go together; LightsSeen, light_bit: what shines on their hits.
+// Provides: render_group: GROUP packets of pixels, whose rays from the eye go together; LightsSeen, lights_known: what shines on their hits.
 // Needs: render.cl, group_trace.cl.  Reads: GROUP (at most 16, whole rows of 4), LIGHTS_SEEN (at most 31), PACKET_WIDTH, PACKET_HEIGHT.
 
 //@hook group
@@ -76,5 +76,12 @@ typedef struct {
     mask_n known, clear;  // bit i: light i was asked for, and nothing is between
 } LightsSeen;
 
-HOT mask_n light_bit(mask_n of, int i) { return ~is_equal(of & (mask_n)((lane_int)1 << i), NO_LANES); }
+// Takes the lanes out of `lit` of which it is known whether light i shines on them, and gives them; `clear`: those that it does. `seen` may be 0.
+HOT mask_n lights_known(const LightsSeen *seen, int i, mask_n *lit, mask_n *clear) {
+    if (!seen || i >= LIGHTS_SEEN) return NO_LANES;
+    const mask_n bit = (mask_n)((lane_int)1 << i), known = *lit & ~is_equal(seen->known & bit, NO_LANES);
+    *clear = known & ~is_equal(seen->clear & bit, NO_LANES);
+    *lit &= ~known;
+    return known;
+}
 //@end

@@ -60,12 +60,8 @@ HOT void group_lights(const Geometry *geometry, global const Light *lights, int 
         geometry.lights_seen = from_group ? lights_seen : 0;
 //@end
 //@hook visible_known
-        if (geometry->lights_seen && i < LIGHTS_SEEN) {
-            const mask_n known = lit & light_bit(geometry->lights_seen->known, i);
-            //@counting count_rays(geometry->counters, COUNT_SHADOW, known);
-            clear = known & light_bit(geometry->lights_seen->clear, i);
-            lit &= ~known;
-        }
+        const mask_n known = lights_known(geometry->lights_seen, i, &lit, &clear);
+        //@counting count_rays(geometry->counters, COUNT_SHADOW, known);
 //@end
 //@hook shadow_trace
     packet_trace(&seen, &rays, 1, &hits);

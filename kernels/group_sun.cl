@@ -146,10 +146,6 @@ HOT void group_suns(const Geometry *geometry, global const Sun *suns, int sun_co
         geometry.suns_seen = from_group ? suns_seen : 0;
 //@end
 //@hook sun_known
-        if (geometry->suns_seen && i < LIGHTS_SEEN) {
-            const mask_n known = lit & light_bit(geometry->suns_seen->known, i);
-            //@counting count_rays(geometry->counters, COUNT_SHADOW, known);
-            clear = known & light_bit(geometry->suns_seen->clear, i);
-            lit &= ~known;
-        }
+        const mask_n known = lights_known(geometry->suns_seen, i, &lit, &clear);
+        //@counting count_rays(geometry->counters, COUNT_SHADOW, known);
 //@end

@@ -26,6 +26,8 @@ def prepare(buffers: Buffers, built: Any, *, planes: bool = True) -> None:
 
 
 class _Launches:
+    """The one kernel, over all kinds of records that the program reads."""
+
     def __init__(self, buffers: Buffers, built: Any, planes: bool) -> None:
         import pyopencl as cl
 
