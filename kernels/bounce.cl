@@ -85,7 +85,7 @@ HOT void bounce_reflected(const Rays *rays, const Hit *hit, real_n *direction) {
         if (current.from_eye) {
             //@ eye_trace
         } else
-            scene_trace(&geometry, &rays, 0, 0, &hits);
+            scene_trace(&geometry, &rays, SHARED_NOTHING, 0, &hits);
 //@end
 //@hook spawn
         if (current.depth_left > 0) {

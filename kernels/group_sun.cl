@@ -73,14 +73,14 @@ static __attribute__((noinline)) void sun_trace(const Geometry *geometry, const 
         count = group_size(of, begin, 2, &all);
         if (!group_lives(rays + begin, count)) continue;
         if (geometry->box_count == 0 || spread_size(&all, 2) > SPREAD) {
-            for (int p = begin; p < begin + count; p++) scene_trace(geometry, rays + p, 0, 1, hits + p);
+            for (int p = begin; p < begin + count; p++) scene_trace(geometry, rays + p, SHARED_NOTHING, 1, hits + p);
             continue;
         }
         group_begin(&group, rays + begin, hits + begin, count);
         for (int p = 0; p < count; p++) places_in_steps(of + begin + p, group.packet + p);
         places_in_steps(&all, &group.all);
-        group_walk(geometry, &group, 0, 1);
-        for (int p = 0; p < count; p++) scene_rest(geometry, group.rays + p, group.active[p], 0, 1, group.hits + p);
+        group_walk(geometry, &group, SHARED_NOTHING, 1);
+        for (int p = 0; p < count; p++) scene_rest(geometry, group.rays + p, group.active[p], SHARED_NOTHING, 1, group.hits + p);
     }
 }
 

@@ -32,7 +32,7 @@ HOT void packet_far(Group *group, int p) {
 }
 
 // The triangles of a block that are left of the group's bounds in `picked`, packet by packet.
-HOT void group_test(const Geometry *geometry, Group *group, global const DirectionBoxes *boxes, uint picked, const int shared_origin,
+HOT void group_test(const Geometry *geometry, Group *group, global const DirectionBoxes *boxes, uint picked, const int shared,
                     const int any_hit) {
     int tested = 0;
     for (int p = 0; p < group->count; p++) {
@@ -42,20 +42,20 @@ HOT void group_test(const Geometry *geometry, Group *group, global const Directi
         Hits *hits = group->hits + p;
         const Rays *rays = group->rays + p;
         //@ count_met
-        const real_n reach = shared_origin ? (real_n)0 : rays_reach(rays, geometry->objects + geometry->surfaces[boxes->item[0]].object);
-        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared_origin, group->active[p], hits);
+        const real_n reach = shared == SHARED_ORIGIN ? (real_n)0 : rays_reach(rays, geometry->objects + geometry->surfaces[boxes->item[0]].object);
+        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared, group->active[p], hits);
         if (any_hit) group->active[p] &= is_less(hits->slot, NO_LANES);
         packet_far(group, p);
     }
     if (tested) group_far(group);
 }
 
-HOT void group_ahead(const Geometry *geometry, int slot, const int shared_origin) {
-    if (shared_origin) fetch_ahead(geometry->planes + slot);
+HOT void group_ahead(const Geometry *geometry, int slot, const int shared) {
+    if (shared == SHARED_ORIGIN) fetch_ahead(geometry->planes + slot);
     else fetch_ahead(geometry->triangles + slot);
 }
 
-HOT void group_walk(const Geometry *geometry, Group *group, const int shared_origin, const int any_hit) {
+HOT void group_walk(const Geometry *geometry, Group *group, const int shared, const int any_hit) {
     int stack[GROUP_STACK];
     float near[GROUP_STACK];
     int top = 1, block = 0;
@@ -74,7 +74,7 @@ HOT void group_walk(const Geometry *geometry, Group *group, const int shared_ori
             global const DirectionBoxes *boxes = geometry->boxes + next;
             met = boxes_met(boxes, &group->all, group->far);
             if (next <= geometry->block_count) {
-                for (uint rest = met; rest; rest &= rest - 1) group_ahead(geometry, boxes->item[first_bit(rest)], shared_origin);
+                for (uint rest = met; rest; rest &= rest - 1) group_ahead(geometry, boxes->item[first_bit(rest)], shared);
             } else {
                 // Onto the stack, the nearest last.
                 for (const int bottom = top; met; met &= met - 1) {
@@ -93,7 +93,7 @@ HOT void group_walk(const Geometry *geometry, Group *group, const int shared_ori
                 continue;
             }
         }
-        if (block > 0) group_test(geometry, group, geometry->boxes + block, picked, shared_origin, any_hit);
+        if (block > 0) group_test(geometry, group, geometry->boxes + block, picked, shared, any_hit);
         block = met ? next : 0;
         picked = met;
     }
@@ -149,7 +149,7 @@ HOT void group_begin(Group *group, const Rays *rays, Hits *hits, int count) {
 
 // A packet that goes alone: one copy for all callers.
 static __attribute__((noinline)) void packet_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
-    scene_trace(geometry, rays, 1, any_hit, hits);
+    scene_trace(geometry, rays, SHARED_ORIGIN, any_hit, hits);
 }
 
 // Rays as scene_trace takes them, with one origin for all that are active. Apart from the callers: they are few, and this is large.
@@ -168,7 +168,7 @@ static __attribute__((noinline)) void group_trace(const Geometry *geometry, cons
         group_begin(&group, rays + begin, hits + begin, count);
         for (int p = 0; p < count; p++) directions_in_steps(geometry->boxes, of[begin + p].lo, of[begin + p].minus_hi, group.packet + p);
         directions_in_steps(geometry->boxes, all.lo, all.minus_hi, &group.all);
-        group_walk(geometry, &group, 1, any_hit);
-        for (int p = 0; p < count; p++) scene_rest(geometry, group.rays + p, group.active[p], 1, any_hit, group.hits + p);
+        group_walk(geometry, &group, SHARED_ORIGIN, any_hit);
+        for (int p = 0; p < count; p++) scene_rest(geometry, group.rays + p, group.active[p], SHARED_ORIGIN, any_hit, group.hits + p);
     }
 }

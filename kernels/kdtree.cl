@@ -5,7 +5,7 @@
 // so that a NaN visits both children: a cell is entered if it cannot be shown to be missed (Ize 2013; Havran 2000).
 
 //@ kdtree_before
-HOT void kdtree_trace(const Geometry *geometry, global const Object *object, const Rays *rays, mask_n active, const int shared_origin,
+HOT void kdtree_trace(const Geometry *geometry, global const Object *object, const Rays *rays, mask_n active, const int shared,
                          const int any_hit, Hits *hits) {
     real_n slab[3], t_enter, t_leave;
     active &= box_clip(object, rays, hits->t, slab, &t_enter, &t_leave);
@@ -13,7 +13,7 @@ HOT void kdtree_trace(const Geometry *geometry, global const Object *object, con
     //@ kdtree_rays
     const real_n reach = rays_reach(rays, object);
     PlaneLines lines;
-    if (shared_origin) plane_lines(rays, slab, &lines);
+    if (shared == SHARED_ORIGIN) plane_lines(rays, slab, &lines);
     // The two words of a node are loaded apart: the split goes to all lanes, the rest decides the way.
     global const int *words = (global const int *)geometry->nodes;
     int stack_node[STACK_SIZE];
@@ -31,7 +31,7 @@ HOT void kdtree_trace(const Geometry *geometry, global const Object *object, con
                 // An inner node: the distance to its plane, as an interval.
                 const real split = (real)((global const float *)words)[at];
                 real_n t_low, t_high;
-                if (shared_origin) {
+                if (shared == SHARED_ORIGIN) {
                     t_low = multiply_add((real_n)split, lines.low_rate[axis], lines.low_start[axis]);
                     t_high = multiply_add((real_n)split, lines.high_rate[axis], lines.high_start[axis]);
                 } else {
@@ -69,9 +69,9 @@ HOT void kdtree_trace(const Geometry *geometry, global const Object *object, con
             const mask_n live = is_at_most(t_near, t_far);
             //@ count_tests
             // On large meshes what the tests wait for is memory: all records of the leaf are asked for at once.
-            if (shared_origin)
+            if (shared == SHARED_ORIGIN)
                 for (int i = first; i < end; i++) fetch_ahead(geometry->planes + geometry->indices[i]);
-            for (int i = first; i < end; i++) triangle_test(geometry, rays, reach, geometry->indices[i], shared_origin, live, hits);
+            for (int i = first; i < end; i++) triangle_test(geometry, rays, reach, geometry->indices[i], shared, live, hits);
             if (any_hit) {
                 lanes &= is_less(hits->slot, NO_LANES);
                 if (!any_lane(lanes)) break;

@@ -50,11 +50,11 @@ HOT int tree_next(const Geometry *geometry, const Rays *rays, mask_n active, rea
 }
 
 // Rays through what is at one place.
-HOT void tree_leaf(const Geometry *geometry, const int place, const Rays *rays, mask_n active, const int shared_origin, const int any_hit,
+HOT void tree_leaf(const Geometry *geometry, const int place, const Rays *rays, mask_n active, const int shared, const int any_hit,
                    Hits *hits) {
     //@ tree_leaf
     const int b = place;
-    kdtree_trace(geometry, geometry->objects + b, rays, active, shared_origin, any_hit, hits);
+    kdtree_trace(geometry, geometry->objects + b, rays, active, shared, any_hit, hits);
     //@ count_object
     //@ tree_direct
 }
@@ -76,7 +76,7 @@ static __attribute__((noinline)) mask_n tree_earlier(const Geometry *geometry, c
     return load_lanes(earlier);
 }
 
-HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int shared_origin, const int any_hit, Hits *hits) {
+HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int shared, const int any_hit, Hits *hits) {
     mask_n active = rays->active;
     int ordered = any_hit;
     //@ tree_ordered
@@ -91,7 +91,7 @@ HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int share
             mask_n other = is_at_least(hits->slot, (mask_n)geometry->slot_count);
             //@ tree_other
             if (!any_hit) hits->slot = choose(other, (mask_n)-1, hits->slot);
-            tree_leaf(geometry, place, rays, active, shared_origin, any_hit, hits);
+            tree_leaf(geometry, place, rays, active, shared, any_hit, hits);
             if (!any_hit) {
                 hits->slot = choose(other & is_less(hits->slot, NO_LANES), before, hits->slot);
                 //@ tree_met
@@ -106,7 +106,7 @@ HOT void scene_trace(const Geometry *geometry, const Rays *rays, const int share
         found.t = multiply_add(hits->t, (real_n)(R(4.0) * UNIT_ROUNDOFF), hits->t);
         found.slot = (mask_n)-1;
         //@ tree_found
-        tree_leaf(geometry, place, rays, active, shared_origin, any_hit, &found);
+        tree_leaf(geometry, place, rays, active, shared, any_hit, &found);
         const mask_n hit = is_at_least(found.slot, NO_LANES), tied = hit & is_equal(found.t, hits->t) & is_at_least(hits->slot, NO_LANES);
         mask_n nearer = hit & is_less(found.t, hits->t);
         if (any_lane(tied)) {

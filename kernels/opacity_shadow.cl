@@ -7,7 +7,7 @@
 #define OPACITY_MOST 1024
 
 // `open` is what the rays' hits are before anything is met.
-static __attribute__((noinline)) void opacity_through(const Geometry *geometry, const Rays *given, const int shared_origin, const Hits *open,
+static __attribute__((noinline)) void opacity_through(const Geometry *geometry, const Rays *given, const int shared, const Hits *open,
                                                       mask_n blocked, real_n *through) {
     Rays rays = *given;
     real_n left = (real_n)1;
@@ -17,7 +17,7 @@ static __attribute__((noinline)) void opacity_through(const Geometry *geometry, 
     for (int pass = 0; pass <= OPACITY_MOST && any_lane(blocked); pass++) {
         Hits hits = *open;
         rays.active = blocked;
-        scene_trace(geometry, &rays, shared_origin, 0, &hits);
+        scene_trace(geometry, &rays, shared, 0, &hits);
         blocked &= is_at_least(hits.slot, NO_LANES);
         lane_int slot[LANES];
         real where[3 * LANES], kept[LANES];

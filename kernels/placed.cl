@@ -11,7 +11,7 @@
 // rays may be off (arrays_placed.py).
 
 HOT void placed_leaf(const Geometry *geometry, const int b, const Rays *rays, mask_n active, const int any_hit, Hits *hits) {
-    kdtree_trace(geometry, geometry->objects + b, rays, active, 0, any_hit, hits);
+    kdtree_trace(geometry, geometry->objects + b, rays, active, SHARED_NOTHING, any_hit, hits);
     //@ count_object
 }
 
@@ -86,7 +86,7 @@ HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit
 //@end
 //@hook tree_leaf
     // Rays of any origin meet all objects alike; those that share their origin know objects at their own place better.
-    if (place < geometry->tree_solids && (!shared_origin || place >= geometry->object_count)) {
+    if (place < geometry->tree_solids && (shared != SHARED_ORIGIN || place >= geometry->object_count)) {
         placed_trace(geometry, place, rays, active, any_hit, hits);
         return;
     }

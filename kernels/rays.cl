@@ -1,5 +1,9 @@
-// Provides: Rays, Hits; rays_prepare, rays_along.
+// Provides: Rays, Hits; SHARED_NOTHING, SHARED_ORIGIN; rays_prepare, rays_along.
 // Needs: lanes.cl.  Reads: nothing.
+
+// What the rays of a packet share, and others that go with it: their origin is geometry->shared_origin.
+#define SHARED_NOTHING 0
+#define SHARED_ORIGIN 1
 
 // LANES rays. `active` lanes are traced; the others hold anything finite.
 typedef struct {

@@ -43,7 +43,7 @@ HOT mask_n reach_trace(const Geometry *geometry, const Rays *rays, const Hit *hi
     Hits hits;
     lit = reach_rays(geometry, rays, hit, to_light, ends, end, short_by, from_eye, extent, lit, &towards, &hits);
     //@ reach_limit
-    scene_trace(geometry, &towards, 0, 1, &hits);
+    scene_trace(geometry, &towards, SHARED_NOTHING, 1, &hits);
     //@counting count_rays(geometry->counters, COUNT_SHADOW, towards.active);
     //@ reach_blocked
     return lit & is_less(hits.slot, NO_LANES);

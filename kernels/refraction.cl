@@ -90,7 +90,7 @@ static __attribute__((noinline)) void media_walls(const Geometry *geometry, glob
         hits.t = probe.t_max;
         hits.slot = (mask_n)-1;
         //@ hits_begin
-        kdtree_trace(geometry, geometry->objects + b, &probe, lanes, 0, 0, &hits);
+        kdtree_trace(geometry, geometry->objects + b, &probe, lanes, SHARED_NOTHING, 0, &hits);
         lane_int slot[LANES];
         store_lanes(choose(lanes, hits.slot, (mask_n)-1), slot);
         for (int k = 0; k < LANES; k++) {

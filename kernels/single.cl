@@ -49,7 +49,7 @@ static __attribute__((noinline)) void single_trace(const Geometry *geometry, glo
                                                    const int any_hit, Hits *hits);
 //@end
 //@hook kdtree_rays
-    if (!shared_origin && geometry->one_by_one && (!geometry->looked_at || single_pays(rays, active))) {
+    if (shared != SHARED_ORIGIN && geometry->one_by_one && (!geometry->looked_at || single_pays(rays, active))) {
         // Copies go to the function: what it is given by pointer could not stay in registers here.
         const Geometry seen = *geometry;
         const Rays copy = *rays;

@@ -39,7 +39,7 @@ HOT void triple_lanes(const double_n *d, const double_n *p, const double_n *q, d
 // a coordinate, as much again for the offset, and the float64 error; which is what `error` becomes. Spheres keep theirs.
 // A point nearer to an edge than 8u |P| is moved to that distance inside its triangle: rounded, it could else lie behind the face
 // beyond the edge, and a ray inside of a closed mesh would leave it there.
-static __attribute__((noinline)) void refine_points(const Geometry *geometry, const Rays *rays, const int shared_origin, const Hit *hit,
+static __attribute__((noinline)) void refine_points(const Geometry *geometry, const Rays *rays, const int shared, const Hit *hit,
                                                     mask_n active, real_n *point, real_n *error) {
     mask_n refined = active & is_less(load_lanes(hit->slot), (mask_n)geometry->slot_count);
     //@ refine_lanes
@@ -54,7 +54,7 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
         gather_double(v2, geometry->vertices[9 * (size_t)slot[k] + 6 + a]);
         e1[a] = v1 - v[a];
         e2[a] = v2 - v[a];
-        origin[a] = shared_origin ? (double_n)geometry->shared_origin[a] : geometry->local_origin[a] + to_double_n(rays->origin[a]);
+        origin[a] = shared == SHARED_ORIGIN ? (double_n)geometry->shared_origin[a] : geometry->local_origin[a] + to_double_n(rays->origin[a]);
         direction[a] = to_double_n(rays->direction[a]);
         corner[a] = v[a] - origin[a];
     }

@@ -14,10 +14,10 @@ typedef struct {
     real_n bound;            // each edge function's error is below it
 } EdgeFunctions;
 
-HOT EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin) {
+HOT EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared) {
     real_n u, v, w;
     EdgeFunctions f;
-    if (shared_origin) {
+    if (shared == SHARED_ORIGIN) {
         global const EdgePlanes *plane = geometry->planes + slot;
         u = dot_uniform(rays->direction, plane->u);
         v = dot_uniform(rays->direction, plane->v);
@@ -52,9 +52,9 @@ typedef struct {
     mask_n grazing;  // lanes that run so nearly inside the plane that t means nothing
 } PlaneHit;
 
-HOT PlaneHit plane_hit(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin) {
+HOT PlaneHit plane_hit(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared) {
     real_n offset, rate, normal_bound, offset_error;
-    if (shared_origin) {
+    if (shared == SHARED_ORIGIN) {
         global const EdgePlanes *plane = geometry->planes + slot;
         offset = (real_n)plane->offset;
         rate = dot_uniform(rays->direction, plane->normal);
@@ -84,14 +84,14 @@ HOT void cross_double(const double *a, const double *b, double *c) {
 HOT double dot_double(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 // One lane's ray by the numbers as given: origin, direction, and the open interval of t in units of the direction's length.
-HOT void ray_given(const Geometry *geometry, const Rays *rays, int lane, const int shared_origin, double *origin, double *direction,
+HOT void ray_given(const Geometry *geometry, const Rays *rays, int lane, const int shared, double *origin, double *direction,
                       double *t_min, double *t_max) {
     //@ ray_given
     real along[LANES], from[LANES];
     for (int a = 0; a < 3; a++) {
         store_lanes(rays->origin[a], from);
         store_lanes(rays->direction[a], along);
-        origin[a] = shared_origin ? geometry->shared_origin[a] : geometry->local_origin[a] + (double)from[lane];
+        origin[a] = shared == SHARED_ORIGIN ? geometry->shared_origin[a] : geometry->local_origin[a] + (double)from[lane];
         direction[a] = (double)along[lane];
     }
     store_lanes(rays->t_min, from);

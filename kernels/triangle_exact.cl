@@ -6,7 +6,7 @@
 // (exact.cl). Hits carry t as an interval [low, t]; of equal t the lowest primitive id stays.
 
 // The lanes in `unsure`, one by one, by the numbers as given: those that hit nearer than what they have; their t.
-static __attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n unsure,
+static __attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry, const Rays *rays, int slot, const int shared, mask_n unsure,
                                                  const Hits *hits, real_n *distance) {
     lane_int test[LANES], best[LANES], limit[LANES];
     real t[LANES];
@@ -18,7 +18,7 @@ static __attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry
     for (int k = 0; k < LANES; k++) {
         if (!test[k]) continue;
         double origin[3], direction[3], t_min, t_max;
-        ray_given(geometry, rays, k, shared_origin, origin, direction, &t_min, &t_max);
+        ray_given(geometry, rays, k, shared, origin, direction, &t_min, &t_max);
         Plane plane;
         int stage = 1;
         plane_double(geometry, origin, direction, slot, &plane);
@@ -51,11 +51,11 @@ static __attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry
     return load_lanes(test);
 }
 
-HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, mask_n live, Hits *hits) {
-    const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared_origin);
+HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared, mask_n live, Hits *hits) {
+    const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared);
     mask_n possible = live & (is_at_least(f.lowest, -f.bound) | is_at_most(f.highest, f.bound));
     if (!any_lane(possible)) return;
-    const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared_origin);
+    const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared);
     real_n t = plane.t, error = plane.error;
     const mask_n outside = is_less(t + error, rays->t_min) | is_greater(t - error, hits->t);
     // The triangle that the ray already has, met again in another leaf, is nothing new.
@@ -70,7 +70,7 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
         const Rays copy = *rays;
         const Hits before = *hits;
         real_n distance = t;
-        const mask_n found = triangle_unsure(&seen, &copy, slot, shared_origin, unsure, &before, &distance);
+        const mask_n found = triangle_unsure(&seen, &copy, slot, shared, unsure, &before, &distance);
         t = distance;
         error = choose(found, (R(4.0) * UNIT_ROUNDOFF) * abs_n(t), error);
         hit |= found;

@@ -6,7 +6,7 @@
 // distance, where both neighbours report the hit and the nearer one stays. The traversal loses no cell (kdtree.cl).
 
 // Lanes that run nearly inside the plane, or start nearly on it: decided in float64, with the same rule. Rare, so kept out of the loop's registers.
-static __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometry, const Rays *rays, int slot, const int shared_origin, mask_n unsure,
+static __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometry, const Rays *rays, int slot, const int shared, mask_n unsure,
                                                   real_n *distance) {
     lane_int test[LANES];
     real t[LANES];
@@ -15,7 +15,7 @@ static __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometr
     for (int k = 0; k < LANES; k++) {
         if (!test[k]) continue;
         double origin[3], along[3], t_min, t_max, p[3][3], n[3], e1[3], e2[3], lowest = INFINITY, highest = -INFINITY, bound = 0;
-        ray_given(geometry, rays, k, shared_origin, origin, along, &t_min, &t_max);
+        ray_given(geometry, rays, k, shared, origin, along, &t_min, &t_max);
         for (int a = 0; a < 3; a++)
             for (int c = 0; c < 3; c++) p[c][a] = geometry->vertices[9 * (size_t)slot + 3 * c + a] - origin[a];
         for (int c = 0; c < 3; c++) {
@@ -41,15 +41,15 @@ static __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometr
     return load_lanes(test);
 }
 
-HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared_origin, mask_n live, Hits *hits) {
-    const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared_origin);
+HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared, mask_n live, Hits *hits) {
+    const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared);
     mask_n hit = live & (is_at_least(f.lowest, -f.bound) | is_at_most(f.highest, f.bound));
     if (!any_lane(hit)) return;
-    const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared_origin);
+    const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared);
     real_n t = plane.t;
     // Where float32 cannot tell whether the hit lies before the ray's start, float64 does.
     mask_n grazing = plane.grazing;
-    if (!shared_origin) grazing |= is_at_most(abs_n(t - rays->t_min), plane.error);
+    if (shared != SHARED_ORIGIN) grazing |= is_at_most(abs_n(t - rays->t_min), plane.error);
     // Where all three edge functions are near their error they say little: seen edge-on, rays near the plane would hit from far beside. Such a ray has
     // two of them within `bound` of one side, so the third below their sum S plus 2 bound. Above 8 bound, S is above 6 bound, and what hits
     // wrongly is within a sixth of the triangle's size of it, as slivers are; below, float64 decides.
@@ -60,7 +60,7 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
         const Geometry seen = *geometry;
         const Rays copy = *rays;
         real_n distance = t;
-        hit = (hit & ~grazing) | triangle_grazing(&seen, &copy, slot, shared_origin, grazing, &distance);
+        hit = (hit & ~grazing) | triangle_grazing(&seen, &copy, slot, shared, grazing, &distance);
         t = distance;
     }
     mask_n closer = is_less(t, hits->t);

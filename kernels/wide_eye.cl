@@ -5,8 +5,8 @@
     if (HAVE_WIDE_EYE) extent = frame->extent;
 //@end
 //@hook trace_default
-        if (HAVE_WIDE_EYE) scene_trace(&geometry, &rays, 0, 0, &hits);
-        else scene_trace(&geometry, &rays, 1, 0, &hits);
+        if (HAVE_WIDE_EYE) scene_trace(&geometry, &rays, SHARED_NOTHING, 0, &hits);
+        else scene_trace(&geometry, &rays, SHARED_ORIGIN, 0, &hits);
 //@end
 //@hook bounce_begin
     if (HAVE_WIDE_EYE) current.from_eye = 0;
