@@ -81,11 +81,21 @@ HOT uint boxes_met(global const DirectionBoxes *boxes, const Directions *all, fl
                            & (lo[2] <= all->hi[2]) & (hi[2] >= all->lo[2]));
 }
 
+// Of numbers, none of them NaN: each is one instruction, which fmax, fmin and floor are not.
+static inline double larger(double a, double b) { return a > b ? a : b; }
+static inline double smaller(double a, double b) { return a < b ? a : b; }
+
+// The greatest whole number not above `value`, within the range of int.
+static inline int whole_below(double value) {
+    const int cut = (int)value;
+    return cut - (value < cut);
+}
+
 // The boxes of one triangle of a block, from the numbers as given, in float64. Where there is none, the box is one that nothing
 // meets; of a triangle that is large, or on whose corner the origin lies, one that all meet. `near` is no farther than the triangle: the
 // distance to its box along the axes, rounded down.
-static inline void prepare_directions(global const double *vertices, global const int2 *blocks, int item, const double *origin, float4 scale,
-                                      global DirectionBoxes *records) {
+static __attribute__((noinline)) void prepare_directions(global const double *vertices, global const int2 *blocks, int item, const double *origin,
+                                                         float4 scale, global DirectionBoxes *records) {
     const int block = item / BOXES, k = item % BOXES;
     if (item == 0) {
         global DirectionScale *head = (global DirectionScale *)records;
@@ -103,24 +113,24 @@ static inline void prepare_directions(global const double *vertices, global cons
         double size = 0;
         for (int a = 0; a < 3; a++) {
             unit[c][a] = vertices[9 * (size_t)slot + 3 * c + a] - origin[a];
-            size = fmax(size, fabs(unit[c][a]));
+            size = larger(size, fabs(unit[c][a]));
         }
         known &= size > 0 && size < INFINITY;
     }
     for (int a = 0; a < 3; a++) {
-        const double lo = fmin(fmin(unit[0][a], unit[1][a]), unit[2][a]), hi = fmax(fmax(unit[0][a], unit[1][a]), unit[2][a]);
-        gap[a] = fmax(fmax(lo, -hi), 0.0);
+        const double lo = smaller(smaller(unit[0][a], unit[1][a]), unit[2][a]), hi = larger(larger(unit[0][a], unit[1][a]), unit[2][a]);
+        gap[a] = larger(larger(lo, -hi), 0.0);
     }
-    const double size = fmax(fmax(gap[0], gap[1]), gap[2]);
+    const double size = larger(larger(gap[0], gap[1]), gap[2]);
     double near = 0;
     if (known && size > 0) {  // scaled, as squares could under- or overflow
         for (int a = 0; a < 3; a++) gap[a] /= size;
         near = size * sqrt(dot_double(gap, gap)) * (1 - WIDENING);
     }
-    box->near[k] = slot < 0 ? INFINITY : (float)fmin(near, (double)FLT_MAX) * (1 - 0x1p-22f);
+    box->near[k] = slot < 0 ? INFINITY : (float)smaller(near, (double)FLT_MAX) * (1 - 0x1p-22f);
     for (int c = 0; c < 3 && known; c++) {
         double largest = 0;
-        for (int a = 0; a < 3; a++) largest = fmax(largest, fabs(unit[c][a]));
+        for (int a = 0; a < 3; a++) largest = larger(largest, fabs(unit[c][a]));
         for (int a = 0; a < 3; a++) unit[c][a] /= largest;
         const double length = sqrt(dot_double(unit[c], unit[c]));
         for (int a = 0; a < 3; a++) unit[c][a] /= length;
@@ -128,25 +138,25 @@ static inline void prepare_directions(global const double *vertices, global cons
     for (int c = 0; c < 3 && known; c++) {
         double apart[3];
         for (int a = 0; a < 3; a++) apart[a] = unit[c][a] - unit[(c + 1) % 3][a];
-        square = fmax(square, dot_double(apart, apart));
+        square = larger(square, dot_double(apart, apart));
     }
     known &= square < 1;
-    const double wider = 1 - sqrt(1 - fmin(square, 1.0) / 3) + WIDENING;
+    const double wider = 1 - sqrt(1 - smaller(square, 1.0) / 3) + WIDENING;
     for (int a = 0; a < 3; a++) {
         // Clamped, both ends stay where what they are compared with is clamped to, or beyond.
         double lo = SHRT_MIN, hi = SHRT_MAX;
         if (known) {
-            lo = fmax(lo, (fmin(fmin(unit[0][a], unit[1][a]), unit[2][a]) - wider - middle[a]) * scale.w);
-            hi = fmin(hi, (fmax(fmax(unit[0][a], unit[1][a]), unit[2][a]) + wider - middle[a]) * scale.w);
+            lo = larger(lo, (smaller(smaller(unit[0][a], unit[1][a]), unit[2][a]) - wider - middle[a]) * scale.w);
+            hi = smaller(hi, (larger(larger(unit[0][a], unit[1][a]), unit[2][a]) + wider - middle[a]) * scale.w);
         }
-        box->lo[a][k] = slot < 0 ? SHRT_MAX : (short)(int)floor(fmin(lo, 32000.0));
-        box->hi[a][k] = slot < 0 ? SHRT_MIN : (short)(int)ceil(fmax(hi, -32000.0));
+        box->lo[a][k] = slot < 0 ? SHRT_MAX : (short)whole_below(smaller(lo, 32000.0));
+        box->hi[a][k] = slot < 0 ? SHRT_MIN : (short)-whole_below(-larger(hi, -32000.0));
     }
     box->item[k] = slot;
 }
 
 // The boxes of one record, as an entry of the record above it: `count` records from `below` on, 16 to each behind them.
-static inline void prepare_unions(global DirectionBoxes *records, int entry, int below, int count) {
+static __attribute__((noinline)) void prepare_unions(global DirectionBoxes *records, int entry, int below, int count) {
     const int k = entry % BOXES;
     global DirectionBoxes *box = records + below + count + entry / BOXES;
     const int there = entry < count;

@@ -14,8 +14,8 @@ typedef struct {
     float axes[3][3];  // A, B, D
 } PlaceFrame;
 
-static inline void prepare_places(global const double *vertices, global const int2 *blocks, int item, global const PlaceFrame *frame,
-                                  const double *local_origin, global DirectionBoxes *records) {
+static __attribute__((noinline)) void prepare_places(global const double *vertices, global const int2 *blocks, int item, global const PlaceFrame *frame,
+                                                     const double *local_origin, global DirectionBoxes *records) {
     const int block = item / BOXES, k = item % BOXES;
     if (item == 0) *(global PlaceFrame *)records = *frame;
     global DirectionBoxes *box = records + 1 + block;

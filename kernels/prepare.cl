@@ -1,4 +1,5 @@
-// Provides: kernel prepare: the records that rays test, from the numbers as given. One for all of them: PoCL compiles each kernel by itself.
+// Provides: kernel prepare: the records that rays test, from the numbers as given. One for all of them: PoCL compiles each kernel by itself, and
+//           what is inlined into it three times: so its parts are not.
 // Needs: lanes.cl, structs, triangle.cl.  Reads: nothing.
 //
 // All in float64, rounded once to `real`; the bounds are derived in triangle.cl.
@@ -9,7 +10,7 @@ static inline double normal_bound(const double *e1, const double *e2, const doub
     return 8 * UNIT_ROUNDOFF * length_double(normal) + 16 * 0x1p-53 * length_double(e1) * length_double(e2);
 }
 
-static inline void prepare_triangle(global const double *vertices, int slot, const double *origin, global Triangle *triangles) {
+static __attribute__((noinline)) void prepare_triangle(global const double *vertices, int slot, const double *origin, global Triangle *triangles) {
     double e1[3], e2[3], normal[3];
     for (int a = 0; a < 3; a++) {
         const double v0 = vertices[9 * slot + a];
@@ -27,7 +28,7 @@ static inline void prepare_triangle(global const double *vertices, int slot, con
     triangles[slot].normal_bound = (real)normal_bound(e1, e2, normal);
 }
 
-static inline void prepare_planes(global const double *vertices, int slot, const double *origin, global EdgePlanes *planes) {
+static __attribute__((noinline)) void prepare_planes(global const double *vertices, int slot, const double *origin, global EdgePlanes *planes) {
     double corner[3][3], e1[3], e2[3], normal[3], edge[3][3], longest = 0, steepest = 0;
     for (int c = 0; c < 3; c++)
         for (int a = 0; a < 3; a++) corner[c][a] = vertices[9 * slot + 3 * c + a] - origin[a];

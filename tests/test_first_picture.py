@@ -10,6 +10,7 @@ import threading
 from pathlib import Path
 
 import numpy as np
+import pyopencl as cl
 import pytest
 
 from clrt import renderer
@@ -18,6 +19,7 @@ from clrt.device.context import POCL, Device
 from clrt.errors import DeviceError, LimitError
 from clrt.features import Features
 from clrt.kdtree.saved import LEAST_TRIANGLES
+from clrt.precision import rung
 from clrt.renderer import with_options
 from clrt.scene.build import parse_scene
 from clrt.scene.saved import LEAST_CHARACTERS
@@ -190,6 +192,18 @@ def test_kernels_are_compiled_for_the_sizes_of_later_launches(tmp_path: Path, sc
     run(scene, caches(tmp_path / "cache"), "picture.png")
     names = sorted(file.name for file in (tmp_path / "cache" / "clrt" / "pocl").rglob("*.so"))
     assert names == ["prepare.so", "render.so"]
+
+
+def test_all_kernels_of_a_picture_are_launched_over_nothing(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A kernel with a parameter of a type that is not known there would wait for its first launch."""
+    scene = with_options(parse_scene(scene_text(300)), None, None, None, 0)
+    launched: list[str] = []
+    call = cl.Kernel.__call__
+    monkeypatch.setattr(
+        cl.Kernel, "__call__", lambda kernel, *given, **more: (launched.append(kernel.function_name), call(kernel, *given, **more))[1]
+    )
+    renderer._begin_program(scene, Features.of(scene), rung("watertight"), device).result()
+    assert sorted(launched) == (["prepare", "render"] if device.info.platform == POCL else [])
 
 
 def test_error_of_the_compiler_comes_out_of_the_thread(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

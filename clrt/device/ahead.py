@@ -59,7 +59,7 @@ def _launch(device: Device, built: Any, source: str, sizes: dict[str, tuple[tupl
     with kernel_cache.loading():
         for name, parameters in _KERNEL.findall(source):
             declared = _DIRECTIVE.sub("", parameters).split(",")
-            arguments = [zeros if "*" in text else _VALUES.get(text.split()[0]) for text in declared]
+            arguments = [zeros if "*" in text else _VALUES.get(text.removeprefix("const ").split()[0]) for text in map(str.strip, declared)]
             if name in sizes and not any(argument is None for argument in arguments):
                 cl.Kernel(built, name)(queue, *sizes[name], *arguments)
         queue.finish()
