@@ -194,7 +194,9 @@ def program_shape(prepared: Prepared, features: Features, shared_lights: bool, w
     """The sizes that the program of these features is compiled for: trees as deep as they may become, so that they need not be there."""
     bounces = any(f.name == "bounce" for f in features.active)
     scene = prepared.scene
-    deepest = max([default_max_depth(len(o)) for o in scene.objects] + [t.depth for t in prepared.trees], default=0)
+    deepest = max([t.depth for t in prepared.trees], default=0)
+    if scene.objects:
+        deepest = max(deepest, default_max_depth(max(map(len, scene.objects))))
     boxes = depth_limit(len(scene.objects) + placement_count(scene) + len(scene.spheres))
     return program.Shape(
         program.stack_size(deepest), scene.depth if bounces else 0, shared_lights, program.stack_size(boxes), wide=wide,

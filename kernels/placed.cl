@@ -10,6 +10,8 @@
 // All rays that meet an object meet the same numbers, so no ray passes between its triangles. Boxes of the tree above are wider by what placed
 // rays may be off (arrays_placed.py).
 
+#define PREPARE_PLACED 5  // triangles, relative to the origins of their objects
+
 HOT void placed_leaf(const Geometry *geometry, const int b, const Rays *rays, mask_n active, const int any_hit, Hits *hits) {
     kdtree_trace(geometry, geometry->objects + b, rays, active, SHARED_NOTHING, any_hit, hits);
     //@ count_object
@@ -193,4 +195,14 @@ HOT void placed_local(const Geometry *geometry, const Rays *rays, const Hit *hit
         // Where an object's own origin is another, points are relative to that.
         if (slot[k] < geometry->slot_count)
             for (int a = 0; a < 3; a++) point[a] += geometry->object_origins[3 * geometry->surfaces[slot[k]].object + a] - geometry->local_origin[a];
+//@end
+//@hook prepare_parameters
+                    , global const double *object_origins, global const Surface *surfaces
+//@end
+//@hook prepare
+    if (what == PREPARE_PLACED) {
+        double own[3];
+        for (int a = 0; a < 3; a++) own[a] = object_origins[3 * surfaces[item].object + a];
+        prepare_triangle(vertices, item, own, triangles);
+    }
 //@end

@@ -18,6 +18,7 @@ from clrt.features import Features
 from clrt.image.image import Image
 from clrt.kdtree import build_tree
 from clrt.kdtree.arrays import LEAF
+from clrt.kdtree.joined import join
 from clrt.kdtree.runs import leaf_runs
 from clrt.kdtree.tree import KdTree
 from clrt.precision import RUNGS, rung
@@ -79,7 +80,7 @@ def walked(tree: KdTree) -> list[list[int]]:
 @pytest.mark.parametrize(("count", "method"), [(1, "sah"), (17, "median"), (700, "sah"), (700, "median"), (90, "brute")])
 def test_triangles_come_in_the_order_of_leaves_in_blocks_of_neighbours(count: int, method: str) -> None:
     tree = build_tree(soup(count), method)
-    order, blocks = leaf_runs(tree, count, 16)
+    order, blocks = leaf_runs(join([tree], [count]), 16)
     leaves = walked(tree)
     assert order.tolist() == [t for leaf in leaves for t in leaf]
     assert blocks[:, 0].tolist() == np.concatenate([[0], np.cumsum(blocks[:, 1])[:-1]]).tolist()
@@ -96,7 +97,7 @@ def test_triangles_come_in_the_order_of_leaves_in_blocks_of_neighbours(count: in
 
 
 def test_tree_without_triangles_has_no_blocks() -> None:
-    order, blocks = leaf_runs(build_tree(np.zeros((0, 3, 3)), "sah"), 0, 16)
+    order, blocks = leaf_runs(join([build_tree(np.zeros((0, 3, 3)), "sah")], [0]), 16)
     assert order.shape == (0,)
     assert blocks.shape == (0, 2)
 

@@ -7,7 +7,8 @@ import pytest
 
 from clrt.device import pack
 from clrt.errors import LimitError
-from clrt.kdtree import build_tree
+from clrt.kdtree import build_tree, joined
+from clrt.kdtree.joined import join
 from clrt.kdtree.tree import KdTree
 
 
@@ -19,10 +20,19 @@ def tree() -> KdTree:
     return build_tree(centers + random.normal(0.0, 0.05, (600, 3, 3)), "sah")
 
 
+def behind_another(tree: KdTree) -> tuple[np.ndarray, np.ndarray]:
+    """The words of a tree that stands behind a small one: the split or first entry, and the shape of each node."""
+    small = build_tree(np.arange(27.0).reshape(3, 3, 3) ** 2, "brute")
+    words = pack.nodes_of(join([small, tree], [3, 600]))
+    assert len(words) == len(small.split_axis) + len(tree.split_axis)
+    split, shape = words[len(small.split_axis) :].T
+    return split, shape
+
+
 def test_inner_nodes_say_which_of_their_children_hold_nothing(tree: KdTree) -> None:
-    split, shape = pack.nodes_of(tree, 5, 0).T
+    split, shape = behind_another(tree)
     inner = np.flatnonzero(shape & 3 != 3)
-    child = (shape[inner] >> 4) - 5
+    child = (shape[inner] >> 4) - 1
     empty = shape == 3  # a leaf of no triangles
     assert empty.any()
     np.testing.assert_array_equal(shape[inner] >> 2 & 1, empty[child])
@@ -31,12 +41,21 @@ def test_inner_nodes_say_which_of_their_children_hold_nothing(tree: KdTree) -> N
 
 
 def test_leaves_say_where_their_triangles_are(tree: KdTree) -> None:
-    first, shape = pack.nodes_of(tree, 0, 40).T
+    first, shape = behind_another(tree)
     leaves = np.flatnonzero(shape & 3 == 3)
     covered = np.concatenate([np.arange(a, a + n) for a, n in zip(first[leaves], shape[leaves] >> 2, strict=True)])
-    np.testing.assert_array_equal(np.sort(covered), 40 + np.arange(tree.reference_count))
+    np.testing.assert_array_equal(np.sort(covered), 3 + np.arange(tree.reference_count))
 
 
-def test_more_nodes_than_words_can_name_are_refused(tree: KdTree) -> None:
+def test_joined_trees_name_their_own_triangles(tree: KdTree) -> None:
+    other = build_tree(np.random.default_rng(8).normal(0.0, 1.0, (40, 3, 3)), "median")
+    both = join([tree, other, tree], [600, 40, 600])
+    np.testing.assert_array_equal(both.indices, np.concatenate([tree.indices, other.indices + 600, tree.indices + 640]))
+    np.testing.assert_array_equal(both.roots, np.cumsum([0, tree.node_count, other.node_count]))
+
+
+def test_more_nodes_than_words_can_name_are_refused(tree: KdTree, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(joined, "MOST_NODES", 2 * tree.node_count - 1)
+    join([tree], [600])
     with pytest.raises(LimitError, match="nodes"):
-        pack.nodes_of(tree, pack.MOST_NODES, 0)
+        join([tree, tree], [600, 600])

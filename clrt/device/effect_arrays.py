@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from clrt.device import arrays_environment, arrays_placed, arrays_rough, arrays_
 from clrt.device.arrays_emitters import emitters
 from clrt.device.packed import FloatArray, Packed
 from clrt.device.program import MEDIA_DEPTH, light_dtype
+from clrt.kdtree.joined import in_a_row
 from clrt.scene.media import around_eye, ranks, refracting_materials
 
 STEEPEST_EDGE = 1e30  #: slope of a spot's hard edge: any rounding error times it is past the whole step
@@ -59,11 +60,22 @@ def _spheres(packed: Packed) -> NDArray[np.void]:
 
 def _corner_normals(packed: Packed) -> NDArray[Any]:
     """(s, 3, 3): the normals at the corners; an object without any has its face normals there."""
-    parts = []
-    for item, order in zip(packed.scene.objects, packed.orders, strict=True):
-        corners = item.vertex_normals if item.vertex_normals is not None else np.repeat(item.normals[:, None], 3, 1)
-        parts.append(corners[order].astype(packed.real))
-    return np.concatenate([np.zeros((0, 3, 3), packed.real), *parts])
+    records = np.repeat(packed.surfaces["normal"][:, None], 3, 1)
+    return _of_corners(packed, [item.vertex_normals for item in packed.scene.objects], records)
+
+
+def _of_corners(packed: Packed, given: Sequence[FloatArray | None], records: NDArray[Any]) -> NDArray[Any]:
+    """records : (s, 3, k), filled with what objects have of each corner; those that have none keep what is there."""
+    having = np.array([values is not None for values in given], np.bool_)
+    if not having.any():
+        return records
+    owners = packed.surfaces["object"]
+    rows = having[owners]
+    counts = np.array([len(item) for item in packed.scene.objects], np.int64)
+    absent = np.cumsum(np.where(having, 0, counts)) - np.where(having, 0, counts)  # triangles before each object without any
+    values = in_a_row([values for values in given if values is not None], np.float64, records.shape[1:])
+    records[rows] = values[packed.order[rows] - absent[owners[rows]]]
+    return records
 
 
 def _media(packed: Packed) -> NDArray[np.int32]:
@@ -89,8 +101,7 @@ def _sample_sums(packed: Packed) -> NDArray[np.float64]:
 
 def _corner_uvs(packed: Packed) -> FloatArray:
     """(s, 3, 2) float64, the texture coordinates of the corners; zero where a triangle has none."""
-    given = [np.zeros((len(o), 3, 2)) if o.uvs is None else o.uvs for o in packed.scene.objects]
-    return np.concatenate([np.zeros((0, 3, 2)), *(uvs[order] for uvs, order in zip(given, packed.orders, strict=True))])
+    return _of_corners(packed, [item.uvs for item in packed.scene.objects], np.zeros((packed.slots, 3, 2)))
 
 
 def _absorption(packed: Packed) -> NDArray[Any]:

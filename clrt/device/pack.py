@@ -8,6 +8,7 @@ trees' leaves first name them ("slots"), which keeps a leaf's triangles near eac
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,17 +17,17 @@ from clrt.device import layout
 from clrt.device.packed import FloatArray, Packed
 from clrt.device.program import frame_dtype, material_dtype
 from clrt.device.rounding import rounded_down, rounded_up
-from clrt.errors import LimitError
 from clrt.features import Features
 from clrt.kdtree.arrays import LEAF
+from clrt.kdtree.joined import JoinedTrees, in_a_row, join
 from clrt.kdtree.runs import leaf_runs
 from clrt.kdtree.tree import KdTree
 from clrt.precision import Precision
-from clrt.scene.model import MeshObject, Scene
+from clrt.scene.model import Scene
 from clrt.scene.placed import object_origins, placed_boxes, placements
 
 _LOWER_EMPTY, _UPPER_EMPTY = 4, 8  #: bits of an inner node's word: a child is a leaf without triangles, as a quarter of leaves are
-MOST_NODES = 1 << 27  #: of all trees together
+_AT_ONCE = 1 << 14  #: triangles that numbers are made of at a time: few enough to stay in a cache
 
 
 def local_origin(scene: Scene) -> FloatArray:
@@ -34,13 +35,12 @@ def local_origin(scene: Scene) -> FloatArray:
 
     A large sphere, such as a floor, does not move it: its centre is far from what is seen of it.
     """
-    boxes = [o.box for o in scene.objects if len(o) and not o.hidden]
+    seen = np.array([len(item) > 0 and not item.hidden for item in scene.objects], np.bool_)
+    lo, hi = (ends[seen] for ends in scene.boxes)
     if scene.instances:
-        boxes += zip(*placed_boxes(scene, placements(scene), points=0.0), strict=True)
-    if boxes:
-        lo = np.min([b[0] for b in boxes], 0)
-        hi = np.max([b[1] for b in boxes], 0)
-        return np.asarray(lo / 2.0 + hi / 2.0)
+        lo, hi = (np.concatenate(ends) for ends in zip((lo, hi), placed_boxes(scene, placements(scene), points=0.0), strict=True))
+    if len(lo):
+        return np.asarray(lo.min(0) / 2.0 + hi.max(0) / 2.0)
     if len(scene.spheres):
         return np.array(scene.spheres.centers[scene.spheres.radii.argmin()])
     return np.zeros(3)
@@ -51,63 +51,80 @@ def tree_origins(scene: Scene) -> FloatArray:
     return object_origins(scene, local_origin(scene))
 
 
-def nodes_of(tree: KdTree, first_node: int, first_index: int) -> NDArray[np.int32]:
-    """(m, 2) int32 node words, as geometry.cl has them. Raises LimitError where a child's number has no room."""
-    if first_node + len(tree.split_axis) > MOST_NODES:
-        raise LimitError(f"the trees of the scene have more than {MOST_NODES:,} nodes; leave some of its triangles out")
-    leaf = tree.split_axis == LEAF
-    inner, hollow = np.flatnonzero(~leaf), leaf & (tree.count == 0)
+def nodes_of(trees: JoinedTrees) -> NDArray[np.int32]:
+    """(m, 2) int32 node words, as geometry.cl has them."""
+    leaf = trees.split_axis == LEAF
+    inner, hollow = np.flatnonzero(~leaf), leaf & (trees.count == 0)
     empty = np.zeros(len(leaf), np.int32)
-    empty[inner] = _LOWER_EMPTY * hollow[tree.child[inner]] + _UPPER_EMPTY * hollow[tree.child[inner] + 1]
+    empty[inner] = _LOWER_EMPTY * hollow[trees.child[inner]] + _UPPER_EMPTY * hollow[trees.child[inner] + 1]
     words = np.empty((len(leaf), 2), np.int32)
-    words[:, 0] = np.where(leaf, tree.child + first_index, tree.split_pos.view(np.int32))
-    words[:, 1] = np.where(leaf, (tree.count << 2) | 3, ((tree.child + first_node) << 4) | empty | tree.split_axis)
+    words[:, 0] = np.where(leaf, trees.child, trees.split_pos.view(np.int32))
+    words[:, 1] = np.where(leaf, (trees.count << 2) | 3, (trees.child << 4) | empty | trees.split_axis)
     return words
 
 
 def unit_normals(vertices: FloatArray) -> FloatArray:
     """(n, 3) unit geometric normals; zero for zero area. Edges are scaled first, so that no size over- or underflows."""
-    e1, e2 = vertices[:, 1] - vertices[:, 0], vertices[:, 2] - vertices[:, 0]
-    for e in (e1, e2):
-        x, y, z = np.abs(e).T
-        size = np.maximum(np.maximum(x, y), z)[:, None]
-        np.divide(e, size, out=e, where=size > 0)
-    normal = np.cross(e1, e2)
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normals = np.empty((len(vertices), 3))
+    for start in range(0, len(vertices), _AT_ONCE):
+        part = slice(start, start + _AT_ONCE)
+        normals[part] = _unit_normals(vertices[part]).T
+    return normals
+
+
+def _unit_normals(vertices: FloatArray) -> FloatArray:
+    """(3, n)"""
+    corners = _by_axis(vertices)
+    a, b = corners[1] - corners[0], corners[2] - corners[0]
+    for edge in (a, b):
+        x, y, z = np.abs(edge)
+        size = np.maximum(np.maximum(x, y), z)
+        np.divide(edge, size, out=edge, where=size > 0)
+    normal = np.stack([a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3)])
+    length = np.sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2])
     return np.asarray(np.divide(normal, length, out=np.zeros_like(normal), where=length > 0))
+
+
+def _longest_edges(vertices: FloatArray) -> FloatArray:
+    """(n,) |x| + |y| + |z| of the longest edge of each triangle."""
+    longest = np.empty(len(vertices))
+    for start in range(0, len(vertices), _AT_ONCE):
+        a, b, c = _by_axis(vertices[start : start + _AT_ONCE])
+        lengths = (x + y + z for x, y, z in (np.abs(b - a), np.abs(c - b), np.abs(a - c)))
+        longest[start : start + _AT_ONCE] = reduce(np.maximum, lengths)
+    return longest
+
+
+def _by_axis(vertices: FloatArray) -> FloatArray:
+    """(3, 3, n) corners, their axes: which NumPy goes through several times as fast."""
+    return np.ascontiguousarray(vertices.transpose(1, 2, 0))
 
 
 def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: Precision) -> Packed:
     """All arrays of a scene. `trees[i]` is the tree of `scene.objects[i]`, over vertices less its row of `tree_origins(scene)`."""
     real, origin = precision.real, local_origin(scene)
-    nodes, indices, orders, blocks = [], [], [], []
-    objects = np.zeros(len(trees), layout.object_record(real))
-    node = index = slot = 0
-    for number, (item, tree) in enumerate(zip(scene.objects, trees, strict=True)):
-        order, parts = leaf_runs(tree, len(item), layout.BOXES)
-        slots = np.full(len(item), -1, np.int64)
-        slots[order] = np.arange(len(order))
-        objects[number] = _object_record(item, tree, node, real)
-        nodes.append(nodes_of(tree, node, index))
-        indices.append((slots[tree.indices] + slot).astype(np.int32))
-        orders.append(order)
-        blocks.append(parts + np.array([slot, 0]))
-        node, index, slot = node + len(tree.split_axis), index + len(tree.indices), slot + len(order)
-    given = [np.take(item.vertices, order, 0) for item, order in zip(scene.objects, orders, strict=True)]
-    vertices = np.concatenate(given) if given else np.zeros((0, 3, 3))
+    joined = join(trees, [len(item) for item in scene.objects])
+    order, blocks = leaf_runs(joined, layout.BOXES)
+    slots = np.full(joined.triangles, -1, np.int32)
+    slots[order] = np.arange(len(order), dtype=np.int32)
+    owners = _owners(scene)[order]
+    counts = np.bincount(owners, minlength=len(trees))
+    vertices = np.take(in_a_row([item.vertices for item in scene.objects], np.float64, (3, 3)), order, 0)
+    objects = _objects(trees, joined, vertices, counts, real)
     return Packed(
         scene=scene,
         origin=origin,
-        nodes=np.concatenate(nodes) if nodes else np.zeros((0, 2), np.int32),
-        indices=np.concatenate(indices) if indices else np.zeros(0, np.int32),
-        blocks=np.concatenate(blocks).astype(np.int32) if blocks else np.zeros((0, 2), np.int32),
+        nodes=nodes_of(joined),
+        indices=slots[joined.indices],
+        blocks=blocks.astype(np.int32),
         vertices=vertices,
         objects=objects,
-        surfaces=_surfaces(scene, orders, vertices, real),
+        surfaces=_surfaces(scene, order, owners, vertices, real),
         materials=_materials(scene, features, precision),
         frame=_frame(scene, origin, objects, len(vertices), features, precision),
-        prim_ids=_prim_ids(scene, orders),
-        orders=tuple(orders),
+        prim_ids=_prim_ids(scene, order, owners),
+        order=order,
+        slot_counts=counts,
         origins=object_origins(scene, origin),
         real=real,
         features=features,
@@ -115,30 +132,42 @@ def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: P
     )
 
 
-def _prim_ids(scene: Scene, orders: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
-    return np.concatenate([o.first_prim + k for o, k in zip(scene.objects, orders, strict=True)] or [np.zeros(0, np.int64)])
+def _owners(scene: Scene) -> NDArray[np.int32]:
+    """Of each triangle, of all objects in a row, the number of its object."""
+    return np.repeat(np.arange(len(scene.objects), dtype=np.int32), [len(item) for item in scene.objects])
 
 
-def _object_record(item: MeshObject, tree: KdTree, root: int, real: type[np.floating]) -> NDArray[np.void]:
-    record = np.zeros((), layout.object_record(real))
-    record["lo"], record["hi"] = rounded_down(tree.lo, real), rounded_up(tree.hi, real)
-    edges = (np.abs(item.vertices[:, (c + 1) % 3] - item.vertices[:, c]).T for c in range(3))
-    longest = max((x + y + z).max(initial=0.0) for x, y, z in edges)
-    reach = np.maximum(np.abs(tree.lo), np.abs(tree.hi)).sum() + longest
-    record["extent"] = rounded_up(np.asarray(reach), real)
-    record["root"] = root
-    return record
+def _prim_ids(scene: Scene, order: NDArray[np.int64], owners: NDArray[np.int32]) -> NDArray[np.int64]:
+    """Of triangles of all objects in a row, each with its object, the primitive ids."""
+    counts = np.array([len(item) for item in scene.objects], np.int64)
+    shifts = np.array([item.first_prim for item in scene.objects], np.int64) - (np.cumsum(counts) - counts)
+    return order + shifts[owners]
 
 
-def _surfaces(scene: Scene, orders: Sequence[NDArray[np.int64]], vertices: FloatArray, real: type[np.floating]) -> NDArray[np.void]:
+def _objects(
+    trees: Sequence[KdTree], joined: JoinedTrees, vertices: FloatArray, counts: NDArray[np.int64], real: type[np.floating]
+) -> NDArray[np.void]:
+    """vertices : (s, 3, 3), `counts` of each object"""
+    records = np.zeros(len(trees), layout.object_record(real))
+    lo, hi = np.array([(tree.lo, tree.hi) for tree in trees]).reshape(-1, 2, 3).transpose(1, 0, 2)
+    records["lo"], records["hi"] = rounded_down(lo, real), rounded_up(hi, real)
+    longest, some = np.zeros(len(trees)), counts > 0
+    if some.any():
+        longest[some] = np.maximum.reduceat(_longest_edges(vertices), (np.cumsum(counts) - counts)[some])
+    records["extent"] = rounded_up(np.maximum(np.abs(lo), np.abs(hi)).sum(1) + longest, real)
+    records["root"] = joined.roots
+    return records
+
+
+def _surfaces(
+    scene: Scene, order: NDArray[np.int64], owners: NDArray[np.int32], vertices: FloatArray, real: type[np.floating]
+) -> NDArray[np.void]:
     records = np.zeros(len(vertices), layout.surface(real))
     records["geometric"] = unit_normals(vertices)
-    records["prim"] = _prim_ids(scene, orders)
-    first = 0
-    for number, (item, order) in enumerate(zip(scene.objects, orders, strict=True)):
-        part = records[first : first + len(order)]
-        part["normal"], part["material"], part["object"] = item.normals[order], item.material_ids[order], number
-        first += len(order)
+    records["prim"] = _prim_ids(scene, order, owners)
+    records["normal"] = np.take(in_a_row([item.normals for item in scene.objects], np.float64, (3,)), order, 0)
+    records["material"] = in_a_row([item.material_ids for item in scene.objects], np.int32)[order]
+    records["object"] = owners
     return records
 
 

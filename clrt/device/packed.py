@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,8 @@ class Packed:
 
     nodes (m, 2) int32; indices (r,) int32 slots; vertices (s, 3, 3) float64 as given; objects, surfaces, materials, frame: structs
     blocks : (b, 2) int32 first slot and count of runs of triangles near each other, BOXES at most
-    prim_ids : (s,) int64 primitive id of each slot
+    prim_ids : (s,) int64 primitive id of each slot; order : (s,) int64 its triangle, of all objects' in a row
+    slot_counts : (objects,) int64 how many slots each has
     trees : one an object; block : the width of their wide trees
     origins : (objects, 3) float64, what the coordinates of each object are relative to: `origin`, but for hidden ones
     """
@@ -37,7 +39,8 @@ class Packed:
     frame: NDArray[np.void]
     prim_ids: NDArray[np.int64]
     origins: FloatArray
-    orders: tuple[NDArray[np.int64], ...]
+    order: NDArray[np.int64]
+    slot_counts: NDArray[np.int64]
     real: type[np.floating]
     features: Features
     trees: tuple[KdTree, ...]
@@ -47,15 +50,9 @@ class Packed:
     def slots(self) -> int:
         return len(self.vertices)
 
-    @property
-    def runs(self) -> list[tuple[FloatArray, int, int]]:
-        """Origin, first and last slot but one of objects in a row that share their origin."""
-        ends = np.cumsum([len(order) for order in self.orders]).tolist()
-        found: list[tuple[FloatArray, int, int]] = []
-        for origin, end in zip(self.origins, ends, strict=True):
-            first = found[-1][2] if found else 0
-            if found and (found[-1][0] == origin).all():
-                found[-1] = (origin, found[-1][1], end)
-            elif end > first:
-                found.append((origin, first, end))
-        return found
+    @cached_property
+    def orders(self) -> tuple[NDArray[np.int64], ...]:
+        """Of each object its triangles in the order of slots."""
+        ends = np.cumsum(self.slot_counts)
+        firsts = np.cumsum([0, *map(len, self.scene.objects)])
+        return tuple(self.order[end - n : end] - first for end, n, first in zip(ends, self.slot_counts, firsts[:-1], strict=True))

@@ -12,7 +12,7 @@ from clrt.device.arrays_wide import wide_trees
 from clrt.device.session import Buffers, multiple
 
 LOCAL = 64
-_TRIANGLES, _PLANES, _DIRECTIONS, _UNIONS, _PLACES = map(np.int32, range(5))
+_TRIANGLES, _PLANES, _DIRECTIONS, _UNIONS, _PLACES, _PLACED = map(np.int32, range(6))
 _OUTERMOST = 32000  #: steps to the direction farthest from the middle: an int16 holds all
 
 
@@ -37,14 +37,16 @@ class _Launches:
         self.eye = np.asarray(packed.scene.camera.eye)
         self.lights = [np.asarray(light.position) for light in packed.scene.lights_with_position]
         #: PoCL tells small launches from large ones, and compiles for each kind: those of a few records are as large as the first
-        self.least = packed.runs[0][2] - packed.runs[0][1]
+        self.least = packed.slots
+        effects = buffers.effects
+        self.of_places = (effects["object_origins"], buffers.core[3]) if "object_origins" in effects else ()
         self.blocks = buffers.upload(packed.blocks) if buffers.boxes else None
 
     def run(self) -> None:
         buffers, packed = self.buffers, self.buffers.packed
-        for origin, first, end in packed.runs:
-            self._launch(_TRIANGLES, end - first, origin, 0, end, offset=first)
-        if "single rays" in dict(buffers.features.lines):
+        called = dict(buffers.features.lines)
+        self._launch(_PLACED if "placed" in called else _TRIANGLES, packed.slots, packed.origin, 0, packed.slots)
+        if "single rays" in called:
             self._single_rays()
         if not self.planes:
             return
@@ -59,7 +61,7 @@ class _Launches:
             for i, sun in enumerate(packed.scene.suns[: program.LIGHTS_SEEN] if "suns" in buffers.boxes else ()):
                 self._places(np.asarray(sun.direction), buffers.boxes["suns"], i * buffers.box_count)
 
-    def _launch(self, what: np.int32, items: int, origin: NDArray[np.float64], first: int, end: int, *, planes: Any = None, offset: int = 0,
+    def _launch(self, what: np.int32, items: int, origin: NDArray[np.float64], first: int, end: int, *, planes: Any = None,
                 of_boxes: tuple[Any, ...] = ()) -> None:  # fmt: skip
         buffers = self.buffers
         if buffers.boxes and not of_boxes:
@@ -67,7 +69,7 @@ class _Launches:
         size = (multiple(max(items, self.least), LOCAL),)
         records = buffers.triangles, buffers.eye_planes if planes is None else planes
         given = what, buffers.vertices, np.array([*origin, 0.0]), *records, np.int32(first), np.int32(end), *of_boxes
-        self.kernel(buffers.device.queue, size, (LOCAL,), *given, global_offset=(offset,))
+        self.kernel(buffers.device.queue, size, (LOCAL,), *given, *self.of_places)
 
     def _of_boxes(
         self, scale: NDArray[np.float32], boxes: Any, below: int = 0, count: int = 0, frame: NDArray[np.float32] | None = None

@@ -15,9 +15,9 @@ from functools import partial
 import numpy as np
 
 from clrt.device.context import Device
-from clrt.errors import ClrtError, DeviceError, LimitError
+from clrt.errors import ClrtError, DeviceError, LimitError, MeshError
 from clrt.kdtree import build_tree
-from clrt.kdtree.common import F64, Progress, checked_vertices, default_max_depth
+from clrt.kdtree.common import F64, Ints, Progress, checked_vertices, default_max_depth
 from clrt.kdtree.tree import KdTree
 
 VARIABLE = "CLRT_TREES"
@@ -90,13 +90,22 @@ def _by_device(meshes: Sequence[F64], origins: F64, device: Device, tell: Tell) 
     tell(0.0)
     some = [i for i, mesh in enumerate(meshes) if len(mesh)]
     counts = np.array([len(meshes[i]) for i in some], np.int64)
-    corners = np.empty((int(counts.sum()), 3, 3))
-    for i, end, count in zip(some, np.cumsum(counts), counts, strict=True):
-        own = corners[end - count : end]
-        np.subtract(meshes[i], origins[i], out=own)
-        checked_vertices(own)
-    limits = np.array([default_max_depth(int(count)) for count in counts], np.int64)
+    corners = _corners([meshes[i] for i in some], origins[some], counts)
+    sizes, which = np.unique(counts, return_inverse=True)
+    limits = np.array([default_max_depth(size) for size in sizes.tolist()], np.int64)[which]
     built = iter(build_forest(Machine.of(device), corners, counts, limits, tell))
     trees = [next(built) if len(mesh) else build_tree(mesh) for mesh in meshes]
     each = (time.perf_counter() - start) / len(corners)
     return trees, [each * len(mesh) for mesh in meshes]
+
+
+def _corners(meshes: Sequence[F64], origins: F64, counts: Ints) -> F64:
+    """(n, 3, 3): the triangles of all meshes, each less its origin; checked."""
+    corners = np.concatenate(meshes, dtype=np.float64)
+    corners -= origins[0] if (origins == origins[0]).all() else np.repeat(origins, counts, axis=0)[:, None]
+    try:
+        return checked_vertices(corners)
+    except MeshError:
+        for mesh, origin in zip(meshes, origins, strict=True):
+            checked_vertices(mesh - origin)  # says which triangle of its own mesh it is
+        raise

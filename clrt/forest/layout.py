@@ -31,14 +31,14 @@ def trees_of(jobs: Jobs, subtrees: Subtrees, inner: Sequence[Inner], counts: Int
     child = np.where(leaf, first_entry[order], 1 + 2 * (rank - rank[starts_of(node_counts)][of_tree])).astype(np.int32)
     position = np.where(leaf, 0, words[order, 1]).astype(np.int32).view(np.float32)
     axis, size = axis[order], size[order].astype(np.int32)
-    deepest = np.maximum.reduceat(depth, starts_of(node_counts))
-    ends, entry_ends, triangles = np.cumsum(node_counts), np.cumsum(entry_counts), starts_of(counts)
-    trees = []
-    for t, (end, entry_end) in enumerate(zip(ends.tolist(), entry_ends.tolist(), strict=True)):
-        own, named = slice(end - int(node_counts[t]), end), slice(entry_end - int(entry_counts[t]), entry_end)
-        indices = entries[named] - np.int32(triangles[t])
-        nodes = axis[own].copy(), position[own].copy(), child[own].copy(), size[own].copy()
-        trees.append(KdTree(lo[t], hi[t], *nodes, indices, int(deepest[t]), "sah", "device"))
+    deepest = np.maximum.reduceat(depth, starts_of(node_counts)).tolist()
+    indices = entries - np.repeat(starts_of(counts), entry_counts).astype(np.int32)
+    ends, entry_ends = np.cumsum(node_counts).tolist(), np.cumsum(entry_counts).tolist()
+    trees, first, first_index = [], 0, 0
+    for t, (end, index_end) in enumerate(zip(ends, entry_ends, strict=True)):
+        nodes = axis[first:end], position[first:end], child[first:end], size[first:end]
+        trees.append(KdTree(lo[t], hi[t], *nodes, indices[first_index:index_end], deepest[t], "sah", "device"))
+        first, first_index = end, index_end
     return trees
 
 

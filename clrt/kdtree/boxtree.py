@@ -76,49 +76,65 @@ def _without(level: _Level, gone: NDArray[np.bool_]) -> _Level:
 
 def _split(lo: F64, hi: F64, level: _Level, firsts: Ints, most: int) -> _Level:
     """The two halves of each node, of `most` boxes at most."""
-    middle = (lo[level.order] + hi[level.order]) / 2.0
+    lo, hi = lo[level.order], hi[level.order]
+    middle = (lo + hi) / 2.0
     segment = np.repeat(np.arange(len(level.count)), level.count)
     low, high = np.minimum.reduceat(middle, level.start), np.maximum.reduceat(middle, level.start)
     width = high - low
-    scale = np.divide(_BINS, width, where=width > 0.0, out=np.zeros_like(width))
-    bins = np.minimum(((middle - low[segment]) * scale[segment]).astype(np.int64), _BINS - 1)
-    axis, plane = _best_planes(lo[level.order], hi[level.order], bins, segment, len(level.count), most)
-    rows = np.arange(len(segment))
-    right = bins[rows, axis[segment]] >= plane[segment]
+    axis, plane = np.zeros(len(level.count), np.int64), np.zeros(len(level.count), np.int64)
+    right = np.zeros(len(segment), np.bool_)
+    more = level.count > 2  # two boxes go apart by whatever plane
+    if more.any():
+        rows, owner = more[segment], (np.cumsum(more) - 1)[segment]
+        scale = np.divide(_BINS, width, where=width > 0.0, out=np.zeros_like(width))
+        bins = np.minimum(((middle[rows] - low[segment[rows]]) * scale[segment[rows]]).astype(np.int64), _BINS - 1)
+        axis[more], plane[more] = _best_planes(lo[rows], hi[rows], bins, owner[rows], int(more.sum()), most)
+        right[rows] = bins[np.arange(len(bins)), axis[segment[rows]]] >= plane[segment[rows]]
     # Where no plane will do, by half: the greater half of the middles along the longest side.
-    stuck = (plane <= 0)[segment]
-    if stuck.any():
-        longest = width.argmax(axis=1)[segment]
-        ranked = np.lexsort((middle[rows, longest], segment))
-        place = np.empty(len(rows), np.int64)
-        place[ranked] = rows - level.start[segment]
-        right = np.where(stuck, place >= (level.count // 2)[segment], right)
-    order = np.lexsort((right, segment))
+    stuck = np.flatnonzero((plane <= 0)[segment])
+    if len(stuck):
+        longest = width.argmax(axis=1)[segment[stuck]]
+        ranked = stuck[np.lexsort((middle[stuck, longest], segment[stuck]))]
+        right[ranked] = stuck - level.start[segment[stuck]] >= (level.count // 2)[segment[stuck]]
     to_right = np.bincount(segment[right], minlength=len(level.count))
     count = np.stack([level.count - to_right, to_right], axis=1).ravel()
+    order = np.argsort(2 * segment + right, kind="stable")
     return _Level(level.order[order], np.cumsum(count) - count, count, np.stack([firsts, firsts + 1], axis=1).ravel())
 
 
 def _best_planes(lo: F64, hi: F64, bins: Ints, segment: Ints, segments: int, most: int) -> tuple[Ints, Ints]:
     """Axis and first bin on the right (k,) of each node's best plane; the bin 0 where none leaves `most` boxes or fewer on both sides."""
-    key = ((segment[:, None] * 3 + np.arange(3)) * _BINS + bins).ravel()
-    size = segments * 3 * _BINS
-    counts = np.bincount(key, minlength=size).reshape(segments, 3, _BINS)
-    ends = []
-    for values, extreme, empty in ((lo, np.minimum, np.inf), (hi, np.maximum, -np.inf)):
-        box = np.full((size, 3), empty)
-        extreme.at(box, key, np.repeat(values, 3, axis=0))
-        ends.append(box.reshape(segments, 3, _BINS, 3))
-    areas = []
-    for turn in (slice(None), slice(None, None, -1)):
-        sides = np.maximum.accumulate(ends[1][:, :, turn], axis=2) - np.minimum.accumulate(ends[0][:, :, turn], axis=2)
-        sides = np.where(np.isfinite(sides), sides, 0.0)
-        areas.append((sides * np.roll(sides, 1, axis=3)).sum(3)[:, :, turn])
-    left = np.cumsum(counts, axis=2)[:, :, :-1]
-    right = counts.sum(2, keepdims=True) - left
-    cost = areas[0][:, :, :-1] * left + areas[1][:, :, 1:] * right
+    keys = [bins[:, axis] * segments + segment for axis in range(3)]
+    counts = np.stack([np.bincount(key, minlength=_BINS * segments).reshape(_BINS, segments) for key in keys], axis=1)
+    lows, highs = _bin_ends(np.minimum, np.inf, lo, keys, segments), _bin_ends(np.maximum, -np.inf, hi, keys, segments)
+    left = np.cumsum(counts, axis=0)[:-1]
+    right = counts.sum(0) - left
+    cost = _areas(lows, highs)[:-1] * left + _areas(lows[::-1], highs[::-1])[:-1][::-1] * right
     usable = (left > 0) & (right > 0) & (left <= most) & (right <= most)
-    cost = np.where(usable, cost, np.inf).reshape(segments, -1)
+    cost = np.where(usable, cost, np.inf).transpose(2, 1, 0).reshape(segments, -1)
     best = cost.argmin(axis=1)
     found = np.isfinite(cost[np.arange(segments), best])
     return best // (_BINS - 1), np.where(found, best % (_BINS - 1) + 1, 0)
+
+
+def _bin_ends(extreme: np.ufunc, empty: float, values: F64, keys: list[Ints], segments: int) -> F64:
+    """(bins, 3, 3, k): of each bin along each axis of k nodes the extreme x, y, z of `values` (n, 3); `empty` where it has no box."""
+    ends = np.empty((3, 3, _BINS * segments))
+    ends.fill(empty)
+    for own, key in zip(ends, keys, strict=True):
+        for end, coordinate in zip(own, values.T, strict=True):
+            extreme.at(end, key, np.ascontiguousarray(coordinate))
+    # Bins first: NumPy goes through long rows several times as fast as along short ones.
+    return np.ascontiguousarray(ends.reshape(3, 3, _BINS, segments).transpose(2, 0, 1, 3))
+
+
+def _areas(lows: F64, highs: F64) -> F64:
+    """(bins, 3, k): half the area of the box around all up to each bin."""
+    lo, hi = lows[0], highs[0]
+    areas = np.empty((len(lows), 3, lows.shape[-1]))
+    for i in range(len(lows)):
+        lo, hi = np.minimum(lo, lows[i]), np.maximum(hi, highs[i])
+        sides = hi - lo
+        x, y, z = np.where(sides >= 0.0, sides, 0.0).transpose(1, 0, 2)
+        areas[i] = x * z + y * x + z * y
+    return areas

@@ -1,4 +1,4 @@
-"""The triangles of a kd-tree in the order of its leaves, depth first, and in blocks: runs of them that are near each other."""
+"""The triangles of kd-trees in the order of their leaves, depth first, and in blocks: runs of them that are near each other."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.kdtree.arrays import LEAF
-from clrt.kdtree.tree import KdTree
+from clrt.kdtree.joined import JoinedTrees
 
 Ints = NDArray[np.int64]
 
 
-def leaf_runs(tree: KdTree, triangles: int, size: int) -> tuple[Ints, Ints]:
-    """The triangles that leaves name, and how they part into blocks of at most `size`.
+def leaf_runs(tree: JoinedTrees, size: int) -> tuple[Ints, Ints]:
+    """The triangles that leaves name, tree by tree, and how they part into blocks of at most `size`, each of one tree.
 
     Returns (order, blocks): the triangles in the order of their first naming, depth first; and (b, 2) the first place in `order` of each
     block, and how many it has: those of the topmost nodes that first name at most `size`, or of a part of a leaf that names more.
@@ -24,7 +24,7 @@ def leaf_runs(tree: KdTree, triangles: int, size: int) -> tuple[Ints, Ints]:
     count, place = tree.count[leaf].astype(np.int64), places[leaf]
     entries = np.repeat(tree.child[leaf] - place, count) + np.arange(int(count.sum()))
     named = tree.indices[entries].astype(np.int64)
-    first = np.empty(triangles, np.int64)
+    first = np.empty(tree.triangles, np.int64)
     first[named[::-1]] = np.arange(len(named))[::-1]  # of equal indices the last write stays: the first naming
     new = first[named] == np.arange(len(named))
     fresh = np.zeros(len(tree.split_axis), np.int64)
@@ -33,10 +33,10 @@ def leaf_runs(tree: KdTree, triangles: int, size: int) -> tuple[Ints, Ints]:
     return named[new], _blocks(tree, levels, fresh, size)
 
 
-def _levels(tree: KdTree) -> list[Ints]:
-    """The inner nodes, level by level from the root."""
+def _levels(tree: JoinedTrees) -> list[Ints]:
+    """The inner nodes, level by level from the roots."""
     levels: list[Ints] = []
-    level: Ints = np.flatnonzero(tree.split_axis[:1] != LEAF)
+    level: Ints = tree.roots[tree.split_axis[tree.roots] != LEAF]
     while level.size:
         levels.append(level)
         level = (tree.child[level, None].astype(np.int64) + np.arange(2)).ravel()
@@ -44,7 +44,7 @@ def _levels(tree: KdTree) -> list[Ints]:
     return levels
 
 
-def _sums(tree: KdTree, levels: list[Ints], count: Ints) -> Ints:
+def _sums(tree: JoinedTrees, levels: list[Ints], count: Ints) -> Ints:
     """Of each node, what the leaves below it have together."""
     total = np.where(tree.split_axis == LEAF, count, 0)
     for level in reversed(levels):
@@ -53,9 +53,10 @@ def _sums(tree: KdTree, levels: list[Ints], count: Ints) -> Ints:
     return total
 
 
-def _first_places(tree: KdTree, levels: list[Ints], count: Ints) -> Ints:
-    """Where what each node has begins, depth first."""
+def _first_places(tree: JoinedTrees, levels: list[Ints], count: Ints) -> Ints:
+    """Where what each node has begins, tree by tree, depth first."""
     total, first = _sums(tree, levels, count), np.zeros(len(tree.split_axis), np.int64)
+    first[tree.roots] = np.cumsum(total[tree.roots]) - total[tree.roots]
     for level in levels:
         lower = tree.child[level]
         first[lower] = first[level]
@@ -63,7 +64,7 @@ def _first_places(tree: KdTree, levels: list[Ints], count: Ints) -> Ints:
     return first
 
 
-def _blocks(tree: KdTree, levels: list[Ints], count: Ints, size: int) -> Ints:
+def _blocks(tree: JoinedTrees, levels: list[Ints], count: Ints, size: int) -> Ints:
     total, first = _sums(tree, levels, count), _first_places(tree, levels, count)
     covered = np.zeros(len(total), bool)
     for level in levels:

@@ -12,6 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from clrt.scene.boxes import box_of, boxes_of
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
@@ -304,10 +306,7 @@ class MeshObject:
     @cached_property
     def box(self) -> tuple[FloatArray, FloatArray]:
         """The least and the greatest coordinates (3,) of its own triangles; zeros where there are none."""
-        if not len(self):
-            return np.zeros(3), np.zeros(3)
-        axes = [self.vertices[:, :, axis] for axis in range(3)]  # NumPy reduces long rows much sooner than short ones
-        return np.array([values.min() for values in axes]), np.array([values.max() for values in axes])
+        return box_of(self.vertices)
 
     @cached_property
     def used_materials(self) -> list[int]:
@@ -378,6 +377,11 @@ class Scene:
     fog: Fog | None = None
     indirect: Indirect | None = None
     instances: tuple[Instance, ...] = ()
+
+    @cached_property
+    def boxes(self) -> tuple[FloatArray, FloatArray]:
+        """(objects, 3): the least and the greatest coordinates of each object's own triangles; zeros where there are none."""
+        return boxes_of(self.objects)
 
     @property
     def triangle_count(self) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from clrt.scene.faults import Faults
 from clrt.scene.instances import object_at
 from clrt.scene.model import FloatArray, MeshObject, Scene
-from clrt.scene.placed import box_of, placed_boxes, placements
+from clrt.scene.placed import placed_boxes, placements
 from clrt.scene.text import Declarations
 from clrt.scene.words import WordCall
 from clrt.scene.words.eye import MOTION
@@ -101,7 +101,7 @@ def _passing(scene: Scene) -> list[int]:
     passing = []
     for item, clear in zip(scene.objects, glass, strict=True):
         way = glides - np.asarray(item.motion)
-        if clear and not item.hidden and way.any() and _enters(shutter.open, shutter.close, start, way, *box_of(item)):
+        if clear and not item.hidden and way.any() and _enters(shutter.open, shutter.close, start, way, *item.box):
             passing.append(item.motion_line)
     placed = placements(replace(scene, objects=tuple(replace(o, hidden=True) for o in scene.objects)))
     boxes = zip(placed.object.tolist(), *placed_boxes(scene, placed), strict=True)

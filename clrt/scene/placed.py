@@ -97,13 +97,7 @@ def seen(scene: Scene, instances: bool = True, motion: bool = True) -> Scene:
 def object_origins(scene: Scene, origin: FloatArray) -> FloatArray:
     """(objects, 3): what objects' coordinates are rounded relative to: `origin`, or the middle of one that is hidden or has instances."""
     apart = _instanced(scene) | np.array([item.hidden for item in scene.objects], np.bool_)
-    middles = [np.mean(box_of(item), axis=0) if own else origin for item, own in zip(scene.objects, apart, strict=True)]
-    return np.array(middles).reshape(-1, 3)
-
-
-def box_of(item: MeshObject) -> tuple[FloatArray, FloatArray]:
-    """The least and the greatest coordinates (3,) of an object's own triangles; zeros where there are none."""
-    return item.box
+    return np.where(apart[:, None], np.mean(scene.boxes, axis=0), origin)
 
 
 def swept(scene: Scene, lo: FloatArray, hi: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -125,7 +119,7 @@ def placed_boxes(scene: Scene, placed: Placements, *, points: float = np.inf) ->
     linear, shift = placed.world_from_object[:, :, :3], placed.world_from_object[:, :, 3]
     for number in np.unique(placed.object).tolist():
         which, item = np.flatnonzero(placed.object == number), scene.objects[number]
-        spread = np.unique(item.vertices.reshape(-1, 3), axis=0) if len(which) * 3.0 * len(item) <= points else _corners(*box_of(item))
+        spread = np.unique(item.vertices.reshape(-1, 3), axis=0) if len(which) * 3.0 * len(item) <= points else _corners(*item.box)
         slack = 16.0 * UNIT_ROUNDOFF * (np.abs(linear[which]) @ np.abs(spread).max(0, initial=0.0) + np.abs(shift[which]))
         at_once = max(1, _NUMBERS // len(spread))
         for start in range(0, len(which), at_once):

@@ -7,7 +7,6 @@ kilometres is brought to a size near 1 first. The picture is the same, whatever 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,14 +18,11 @@ _ORDINARY = 20  #: scenes between 2^-20 and 2^20 stay as they are: their product
 
 def size_exponent(scene: Scene) -> int:
     """e with the size of the scene in [2^(e-1), 2^e): the longest side of its triangles' boxes or the greatest radius."""
-    sizes = [float((hi / 2.0 - lo / 2.0).max()) * 2.0 for lo, hi in _boxes(scene)]
+    lo, hi = scene.boxes
+    sizes = [float((hi / 2.0 - lo / 2.0).max()) * 2.0] if len(lo) else []
     sizes += [float(scene.spheres.radii.max())] if len(scene.spheres) else []
     largest = max(sizes, default=0.0)
     return int(np.frexp(largest)[1]) if 0.0 < largest < np.inf else 0
-
-
-def _boxes(scene: Scene) -> Iterator[tuple[FloatArray, FloatArray]]:
-    return (o.box for o in scene.objects if len(o))
 
 
 def at_working_size(scene: Scene) -> Scene:
