@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from clrt.device import context, early, kernel_cache
+from clrt.device import context, early, kernel_cache, opencl
 from clrt.device.context import POCL, Device
 
 SCENE = "E 0 0 -1\nV 0 0 1\nF 45\nR 16 16\nL 5 5 -5\nM 1 0.5 0.2 0.2 0.8 0 1 0\nT -1 -1 2 1 -1 2 0 1 2\n"
@@ -31,18 +31,20 @@ def _run(code: str, folder: Path, **more: str) -> subprocess.CompletedProcess[st
     return done
 
 
-def test_context_is_open_before_pyopencl_is_imported_and_is_the_one_that_is_used(tmp_path: Path) -> None:
+def test_context_is_open_before_anything_is_imported_and_is_the_one_that_is_used(tmp_path: Path) -> None:
     code = """
 import sys
-from clrt.device import context, early, program
+from clrt.device import context, early
 begun = early.begin()
-print("pyopencl" in sys.modules, "pyopencl._cl" in sys.modules)
+print({"numpy", "pyopencl", "pyopencl._cl"} & set(sys.modules))
 device = context.open_device(None, begun)
-(opened,) = begun.values()
-print(device.context is opened, device.queue.context == opened)
+((handle, opened),) = begun.items()
+print(device.handle.int_ptr == handle, device.context.int_ptr == opened)
+from clrt.device import program
 program.build(device, "kernel void one(global int *x) { x[0] = 1; }")
+print("pyopencl" in sys.modules)
 """
-    assert _run(code, tmp_path).stdout.split() == ["False", "True", "True", "True"]
+    assert _run(code, tmp_path).stdout.split() == ["set()", "True", "True", "False"]
 
 
 def test_library_is_read_once_and_first(tmp_path: Path) -> None:
@@ -60,18 +62,31 @@ def test_library_is_read_once_and_first(tmp_path: Path) -> None:
 
 def test_nothing_is_begun_where_a_program_is_compiled_already(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
-    monkeypatch.setattr(early, "_extension", lambda: pytest.fail("something was begun"))
+    monkeypatch.setattr(early, "_read_library", lambda *_: pytest.fail("something was begun"))
     (tmp_path / "AB").mkdir()
     assert early.begin() == {}
 
 
-def test_device_opens_where_the_extension_is_not_as_expected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("words", [["scene.txt"], ["scene.txt", "--no-cache"], ["nothing.txt"], ["render", "scene.txt"]])
+def test_command_begins_with_the_device_where_a_scene_is_named_that_is_there(tmp_path: Path, words: list[str]) -> None:
+    """Before the words are read: so not where they may say that nothing is kept."""
+    (tmp_path / "scene.txt").write_text(SCENE)
+    code = f"import sys\nsys.argv = {['clrt', *words, '-q']!r}\nfrom clrt.cli import entry\n"
+    code += "import clrt.device.early as early\nearly.start = lambda: print('begun', sorted({'numpy', 'click'} & set(sys.modules)))\n"
+    code += "entry.main()"
+    environment = os.environ | {kernel_cache.VARIABLE: str(tmp_path / "pocl"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.stdout.startswith("begun []") == (words == ["scene.txt"])
+    assert (tmp_path / "scene.png").exists() == ("scene.txt" in words)
+
+
+def test_device_opens_where_the_library_is_not_as_expected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
 
     def other() -> None:
-        raise AttributeError("get_platforms")
+        raise AttributeError("clGetPlatformIDs")
 
-    monkeypatch.setattr(early, "_extension", other)
+    monkeypatch.setattr(opencl, "functions", other)
     assert early.open_device().info == context.open_device().info
 
 

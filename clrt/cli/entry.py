@@ -1,4 +1,4 @@
-"""Where the program starts. Until it is loaded, Ctrl-C ends it at once; then interrupt.py takes over."""
+"""Where the program starts, and PoCL with it. Until it is loaded, Ctrl-C ends it at once; then interrupt.py takes over."""
 
 from __future__ import annotations
 
@@ -21,11 +21,23 @@ def main() -> None:
     asked = signal.getsignal(signal.SIGINT) is signal.default_int_handler  # else the caller had it ignored, as for background jobs
     if asked:
         signal.signal(signal.SIGINT, _leave)
+    from clrt.cli import streams
+
+    streams.hold_descriptors()
+    if _renders(sys.argv[1:]):
+        from clrt.device import early
+
+        early.start()
     from clrt.cli.main import main as run
 
     if asked:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     run()
+
+
+def _renders(words: list[str]) -> bool:
+    """Whether a scene will surely be rendered, on what is kept: a file is named, with a suffix, which no command has."""
+    return bool(words) and "." in words[0] and os.path.isfile(words[0]) and "--no-cache" not in words
 
 
 def _leave(number: int, frame: FrameType | None) -> NoReturn:

@@ -108,7 +108,6 @@ def main() -> None:
 
     from clrt.cli import clock
 
-    streams.hold_descriptors()
     clock.begin()
     interrupt.watch()
     try:

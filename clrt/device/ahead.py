@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from clrt.device import kernel_cache, program
+from clrt.device import kernel_cache, opencl, program
 from clrt.device.context import POCL, Device
 from clrt.device.prepare import LOCAL
 from clrt.device.session import multiple
@@ -52,8 +52,7 @@ def _launch(device: Device, built: Any, source: str, sizes: dict[str, tuple[tupl
 
     One that has an argument of another type is left to its first launch.
     """
-    import pyopencl as cl
-
+    cl = opencl.api()
     queue = cl.CommandQueue(device.context)
     zeros = cl.Buffer(device.context, cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR, hostbuf=np.zeros(_DUMMY_BYTES, np.uint8))
     with kernel_cache.loading():

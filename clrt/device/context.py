@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from clrt.device import kernel_cache, pocl_cpu
+from clrt.device import kernel_cache, opencl, pocl_cpu
 from clrt.errors import DeviceError
 
 POCL = "Portable Computing Language"
@@ -54,8 +54,7 @@ def _none_found() -> str:
 def _handles() -> list[Any]:
     """Every device of every platform; CPU devices of PoCL first, other CPU devices next."""
     kernel_cache.choose_folder()
-    import pyopencl as cl
-
+    cl = opencl.api()
     try:
         platforms = cl.get_platforms()
     except cl.Error as error:
@@ -94,10 +93,10 @@ def list_devices() -> list[DeviceInfo]:
     return [_info(handle, default=i == 0) for i, handle in enumerate(_handles())]
 
 
-def open_device(name: str | None = None, contexts: Mapping[int, Any] | None = None) -> Device:
+def open_device(name: str | None = None, contexts: Mapping[int, int] | None = None) -> Device:
     """The device whose platform or name contains `name` (any case); the default one for None or an empty name.
 
-    contexts : of devices, by their address, that are open already
+    contexts : of devices, by their address, that are open already: the addresses of those, which are taken over
     A platform comes before a name: two platforms' devices may be one processor, and PoCL's name holds the processor's maker.
     Raises DeviceError with the list of devices where none fits, or where the device lacks float64, in which
     the records that rays test are computed.
@@ -119,7 +118,7 @@ def open_device(name: str | None = None, contexts: Mapping[int, Any] | None = No
         raise DeviceError(f"the device '{info.name}' has no float64 (cl_khr_fp64), which clrt needs to prepare its triangles")
     if info.platform == POCL:
         pocl_cpu.name_processor(handle)
-    import pyopencl as cl
-
-    context = (contexts.get(handle.int_ptr) if contexts else None) or cl.Context([handle])
+    cl = opencl.api()
+    begun = contexts.get(handle.int_ptr) if contexts else None
+    context = cl.Context.from_int_ptr(begun, False) if begun else cl.Context([handle])
     return Device(info, handle, context, cl.CommandQueue(context))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device import kernel_cache, layout, program
+from clrt.device import kernel_cache, layout, opencl, program
 from clrt.device.arrays_wide import wide_trees
 from clrt.device.session import Buffers, multiple
 
@@ -29,8 +29,7 @@ class _Launches:
     """The one kernel, over all kinds of records that the program reads."""
 
     def __init__(self, buffers: Buffers, built: Any, planes: bool) -> None:
-        import pyopencl as cl
-
+        cl = opencl.api()
         self.buffers, self.built, self.planes = buffers, built, planes
         self.kernel = cl.Kernel(built, "prepare")
         packed = buffers.packed
@@ -106,8 +105,7 @@ class _Launches:
 
     def _single_rays(self) -> None:
         """Blocks of the wide trees."""
-        import pyopencl as cl
-
+        cl = opencl.api()
         buffers = self.buffers
         slots = wide_trees(buffers.packed).slots
         given = buffers.upload(slots)

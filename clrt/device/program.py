@@ -18,13 +18,12 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, partial
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from clrt.device import kernel_cache, layout, lean
+from clrt.device import kernel_cache, layout, lean, opencl
 from clrt.device.context import POCL, Device
 from clrt.errors import DeviceError, LimitError
 from clrt.features import REAL, Features
@@ -130,10 +129,10 @@ def item_size(lanes: int, groups: bool) -> tuple[int, int]:
 
 
 @cache
-def kernel_folder() -> Any:
+def kernel_folder() -> Path:
     """Where the kernel files are: inside the installed package, or at the top of a checkout."""
-    inside = resources.files("clrt") / "kernels"
-    return inside if inside.is_dir() else Path(__file__).resolve().parents[2] / "kernels"
+    inside = Path(__file__).resolve().parents[1] / "kernels"
+    return inside if inside.is_dir() else inside.parents[1] / "kernels"
 
 
 @cache
@@ -317,8 +316,7 @@ def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> An
     A broken entry of PoCL's cache can fail here; so a build that fails is tried once more, from a text that no cache knows, with the
     cache emptied first unless somebody else is loading from it. Raises DeviceError with the compiler's message.
     """
-    import pyopencl as cl
-
+    cl = opencl.api()
     check_options((*options, *os.environ.get("PYOPENCL_BUILD_OPTIONS", "").split()))  # pyopencl adds these to ours
     error: Exception | None = None
     for text, more in lean.attempts(kernel_folder(), source, pocl=device.info.platform == POCL):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device import kernel_cache, layout, program
+from clrt.device import kernel_cache, layout, opencl, program
 from clrt.device.arrays_wide import wide_trees
 from clrt.device.context import Device
 from clrt.device.effect_arrays import PACKERS
@@ -125,16 +125,14 @@ class Buffers:
             raise LimitError(f"{self.packed.slots:,} triangles need {need >> 20:,} MiB on the device, which has {there >> 20:,} MiB")
 
     def upload(self, array: NDArray[Any], *, writable: bool = False) -> Any:
-        import pyopencl as cl
-
+        cl = opencl.api()
         flags = (cl.mem_flags.READ_WRITE if writable else cl.mem_flags.READ_ONLY) | cl.mem_flags.COPY_HOST_PTR
         contents = np.ascontiguousarray(array) if array.size else np.zeros(1, array.dtype)
         check_buffer(self.device, contents.nbytes, "the scene")
         return cl.Buffer(self.device.context, flags, hostbuf=contents)
 
     def empty(self, size: int) -> Any:
-        import pyopencl as cl
-
+        cl = opencl.api()
         check_buffer(self.device, size, "the scene")
         return cl.Buffer(self.device.context, cl.mem_flags.READ_WRITE, size)
 
@@ -148,8 +146,7 @@ class StageCounter:
 
     def read(self) -> dict[str, int]:
         """The counts since the last call."""
-        import pyopencl as cl
-
+        cl = opencl.api()
         counts = np.zeros(2, np.int32)
         cl.enqueue_copy(self.queue, counts, self.buffer)
         cl.enqueue_copy(self.queue, self.buffer, np.zeros(2, np.int32))
@@ -160,8 +157,7 @@ class Tracer:
     """A built program with the buffers it reads; `run` renders rows of the film."""
 
     def __init__(self, buffers: Buffers, built: Any, *, counting: bool = False) -> None:
-        import pyopencl as cl
-
+        cl = opencl.api()
         scene = buffers.packed.scene
         self.buffers, self.counting = buffers, counting
         self.width, self.height = scene.camera.width, scene.camera.height
@@ -196,8 +192,7 @@ class Tracer:
 
     def begin_samples(self, first: int, end: int) -> None:
         """The next rows are those of samples [first, end), which are added to the ones before them. For scenes that are sampled."""
-        import pyopencl as cl
-
+        cl = opencl.api()
         cl.enqueue_copy(self.buffers.device.queue, self.buffers.effects["sample_range"], np.array([first, end, 0], np.int32))
 
     def run_tiles(self, frame: Any, sums: Any, samples: tuple[int, int], tiles: NDArray[np.int32]) -> None:
@@ -241,22 +236,19 @@ class Tracer:
 
     def begin_counting(self) -> None:
         """What is launched next is counted from 0. In the counting build alone, as is `end_counting`."""
-        import pyopencl as cl
-
+        cl = opencl.api()
         self.counters[:] = 0
         cl.enqueue_copy(self.buffers.device.queue, self._counter_buffer, self.counters)
 
     def end_counting(self) -> None:
         """Adds what was counted to `counts`."""
-        import pyopencl as cl
-
+        cl = opencl.api()
         cl.enqueue_copy(self.buffers.device.queue, self.counters, self._counter_buffer)
         self.counts += self.counters.astype(np.int64)
 
     def picture(self) -> NDArray[np.float32]:
         """(height, width, 3) float32, linear."""
-        import pyopencl as cl
-
+        cl = opencl.api()
         pixels = np.empty((self.height, self.width, 3), np.float32)
         cl.enqueue_copy(self.buffers.device.queue, pixels, self.film)
         return pixels

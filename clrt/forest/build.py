@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from clrt.device import opencl
 from clrt.errors import DeviceError
 from clrt.forest.layout import trees_of
 from clrt.forest.machine import Machine
@@ -20,8 +21,7 @@ def build_forest(machine: Machine, vertices: F64, counts: Ints, limits: Ints, pr
     vertices : (n, 3, 3), contiguous, finite; not changed. limits : no leaf of a tree is deeper.
     Raises LimitError where the device has too little memory, DeviceError for what else it cannot do.
     """
-    import pyopencl as cl
-
+    cl = opencl.api()
     try:
         return _build(machine, vertices, counts, limits, progress)
     except cl.Error as error:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from clrt.device import kernel_cache, program
+from clrt.device import kernel_cache, opencl, program
 from clrt.device.context import Device
 from clrt.device.session import check_buffer
 from clrt.kdtree.binning import LEAST_BINS, MOST_BINS
@@ -43,8 +43,7 @@ def compiled_before(device: Device) -> bool:
 
 def is_processor(device: Device) -> bool:
     """Whether it is a CPU, whose work-items are fast alone."""
-    import pyopencl as cl
-
+    cl = opencl.api()
     return bool(device.handle.type & cl.device_type.CPU)
 
 
@@ -71,8 +70,7 @@ class Machine:
         return _machine(device)
 
     def __init__(self, device: Device) -> None:
-        import pyopencl as cl
-
+        cl = opencl.api()
         self.device, self._cl = device, cl
         built = program.build(device, source())
         self._kernels = {name: cl.Kernel(built, name) for name in _KERNELS}
