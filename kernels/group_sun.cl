@@ -1,10 +1,10 @@
 // Provides: which suns shine on what the eye sees of a group: group_suns; rays of one direction go together.
-// Needs: group.cl, reach.cl, sun.cl.  Reads: GROUP, BOXES.
+// Needs: group.cl, sun_visible.cl, sun.cl.  Reads: GROUP, BOXES, SUN_SHARED.
 //
 // Rays towards a sun, D, are told apart by where they cross a plane across it: by s = p.A and t = p.B of their starts p, with A, B, D at right
 // angles. Seen along D a triangle's box in s and t bounds what rays meet it, and a ray leaves behind what ends before it starts, by z = p.D.
 // So records of boxes are as those of directions (directions.cl), of places in units of half the scene's size from its middle, and picked
-// triangles are tested as those of any rays are. Places of triangles are computed in float64 with the axes as they were rounded; those of rays
+// triangles are tested by their planes along it (sun_visible.cl). Places of triangles are computed in float64 with the axes as they were rounded; those of rays
 // are off by the rounding of p - m, of products and sums, below 8u (|p| + |m|) in each axis, and by D.A, D.B, which are below 2^-23, over the
 // way from p to the triangles: 2^-20 (|p| + |m|) holds both, with u = 2^-24 or less; and the way on through them is a hundredth of a step.
 #define PREPARE_PLACES 4
@@ -73,14 +73,14 @@ static __attribute__((noinline)) void sun_trace(const Geometry *geometry, const 
         count = group_size(of, begin, 2, &all);
         if (!group_lives(rays + begin, count)) continue;
         if (geometry->box_count == 0 || spread_size(&all, 2) > SPREAD) {
-            for (int p = begin; p < begin + count; p++) scene_trace(geometry, rays + p, SHARED_NOTHING, 1, hits + p);
+            for (int p = begin; p < begin + count; p++) scene_trace(geometry, rays + p, SUN_SHARED, 1, hits + p);
             continue;
         }
         group_begin(&group, rays + begin, hits + begin, count);
         for (int p = 0; p < count; p++) places_in_steps(of + begin + p, group.packet + p);
         places_in_steps(&all, &group.all);
-        group_walk(geometry, &group, SHARED_NOTHING, 1);
-        for (int p = 0; p < count; p++) scene_rest(geometry, group.rays + p, group.active[p], SHARED_NOTHING, 1, group.hits + p);
+        group_walk(geometry, &group, SUN_SHARED, 1);
+        for (int p = 0; p < count; p++) scene_rest(geometry, group.rays + p, group.active[p], SUN_SHARED, 1, group.hits + p);
     }
 }
 
@@ -89,8 +89,6 @@ HOT void group_suns(const Geometry *geometry, global const Sun *suns, int sun_co
     for (int p = 0; p < GROUP; p++) seen[p].known = seen[p].clear = NO_LANES;
     for (int i = 0; i < sun_count && i < LIGHTS_SEEN; i++) {
         const mask_n bit = (mask_n)((lane_int)1 << i);
-        Geometry along = *geometry;
-        along.boxes = geometry->sun_boxes + (size_t)i * geometry->box_count;
         real_n to_light[3];
         for (int a = 0; a < 3; a++) to_light[a] = (real_n)suns[i].direction[a];
         Rays rays[GROUP];
@@ -106,6 +104,7 @@ HOT void group_suns(const Geometry *geometry, global const Sun *suns, int sun_co
             some |= lit;
         }
         if (!any_lane(some)) continue;
+        const Geometry along = sun_geometry(geometry, i);
         sun_trace(&along, rays, met);
         for (int p = 0; p < GROUP; p++) seen[p].clear |= is_less(met[p].slot, NO_LANES) & bit;
     }
@@ -124,6 +123,9 @@ HOT void group_suns(const Geometry *geometry, global const Sun *suns, int sun_co
 //@hook begin
     geometry.sun_boxes = sun_boxes;
     geometry.suns_seen = 0;
+//@end
+//@hook sun_geometry
+    along.boxes = geometry->sun_boxes + (size_t)index * geometry->box_count;
 //@end
 //@hook prepare_parameters
                     , global const float *place_frame, double4 local_origin

@@ -50,11 +50,6 @@ HOT void group_test(const Geometry *geometry, Group *group, global const Directi
     if (tested) group_far(group);
 }
 
-HOT void group_ahead(const Geometry *geometry, int slot, const int shared) {
-    if (shared == SHARED_ORIGIN) fetch_ahead(geometry->planes + slot);
-    else fetch_ahead(geometry->triangles + slot);
-}
-
 HOT void group_walk(const Geometry *geometry, Group *group, const int shared, const int any_hit) {
     int stack[GROUP_STACK];
     float near[GROUP_STACK];
@@ -74,7 +69,7 @@ HOT void group_walk(const Geometry *geometry, Group *group, const int shared, co
             global const DirectionBoxes *boxes = geometry->boxes + next;
             met = boxes_met(boxes, &group->all, group->far);
             if (next <= geometry->block_count) {
-                for (uint rest = met; rest; rest &= rest - 1) group_ahead(geometry, boxes->item[first_bit(rest)], shared);
+                for (uint rest = met; rest; rest &= rest - 1) fetch_test(geometry, boxes->item[first_bit(rest)], shared);
             } else {
                 // Onto the stack, the nearest last.
                 for (const int bottom = top; met; met &= met - 1) {

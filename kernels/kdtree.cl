@@ -69,8 +69,8 @@ HOT void kdtree_trace(const Geometry *geometry, global const Object *object, con
             const mask_n live = is_at_most(t_near, t_far);
             //@ count_tests
             // On large meshes what the tests wait for is memory: all records of the leaf are asked for at once.
-            if (shared == SHARED_ORIGIN)
-                for (int i = first; i < end; i++) fetch_ahead(geometry->planes + geometry->indices[i]);
+            if (shared != SHARED_NOTHING)
+                for (int i = first; i < end; i++) fetch_test(geometry, geometry->indices[i], shared);
             for (int i = first; i < end; i++) triangle_test(geometry, rays, reach, geometry->indices[i], shared, live, hits);
             if (any_hit) {
                 lanes &= is_less(hits->slot, NO_LANES);

@@ -155,6 +155,11 @@ HOT real_n dot_uniform(const real_n *a, global const real *b) {
 #pragma OPENCL FP_CONTRACT ON
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
+// Of a point and a plane: the fourth number is its constant.
+HOT real_n place_uniform(const real_n *a, global const real *b) {
+#pragma OPENCL FP_CONTRACT ON
+    return a[0] * b[0] + (a[1] * b[1] + (a[2] * b[2] + b[3]));
+}
 HOT real_n multiply_add(real_n a, real_n b, real_n c) {
 #pragma OPENCL FP_CONTRACT ON
     return a * b + c;

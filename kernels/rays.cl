@@ -1,9 +1,10 @@
-// Provides: Rays, Hits; SHARED_NOTHING, SHARED_ORIGIN; rays_prepare, rays_along.
+// Provides: Rays, Hits; SHARED_NOTHING, SHARED_ORIGIN, SHARED_DIRECTION; rays_prepare, rays_along.
 // Needs: lanes.cl.  Reads: nothing.
 
 // What the rays of a packet share, and others that go with it: their origin is geometry->shared_origin.
 #define SHARED_NOTHING 0
 #define SHARED_ORIGIN 1
+#define SHARED_DIRECTION 2
 
 // LANES rays. `active` lanes are traced; the others hold anything finite.
 typedef struct {

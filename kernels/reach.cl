@@ -38,12 +38,12 @@ HOT mask_n reach_rays(const Geometry *geometry, const Rays *rays, const Hit *hit
 }
 
 HOT mask_n reach_trace(const Geometry *geometry, const Rays *rays, const Hit *hit, const real_n *to_light, const int ends, const real_n *end,
-                       real_n short_by, const int from_eye, real extent, mask_n lit) {
+                       real_n short_by, const int from_eye, real extent, const int shared, mask_n lit) {
     Rays towards;
     Hits hits;
     lit = reach_rays(geometry, rays, hit, to_light, ends, end, short_by, from_eye, extent, lit, &towards, &hits);
     //@ reach_limit
-    scene_trace(geometry, &towards, SHARED_NOTHING, 1, &hits);
+    scene_trace(geometry, &towards, shared, 1, &hits);
     //@counting count_rays(geometry->counters, COUNT_SHADOW, towards.active);
     //@ reach_blocked
     return lit & is_less(hits.slot, NO_LANES);
@@ -51,12 +51,12 @@ HOT mask_n reach_trace(const Geometry *geometry, const Rays *rays, const Hit *hi
 
 HOT mask_n reach_clear(const Geometry *geometry, const Rays *rays, const Hit *hit, const real_n *to_light, const int from_eye, real extent,
                        mask_n lit) {
-    return reach_trace(geometry, rays, hit, to_light, 0, to_light, (real_n)0, from_eye, extent, lit);
+    return reach_trace(geometry, rays, hit, to_light, 0, to_light, (real_n)0, from_eye, extent, SHARED_NOTHING, lit);
 }
 
 HOT mask_n reach_point(const Geometry *geometry, const Rays *rays, const Hit *hit, const real_n *to_light, const real_n *end, real_n short_by,
                        const int from_eye, real extent, mask_n lit) {
-    return reach_trace(geometry, rays, hit, to_light, 1, end, short_by, from_eye, extent, lit);
+    return reach_trace(geometry, rays, hit, to_light, 1, end, short_by, from_eye, extent, SHARED_NOTHING, lit);
 }
 
 //@hook sphere_meets

@@ -1,9 +1,84 @@
-// Provides: what stands between hits and suns.
-// Needs: sun.cl, reach.cl.  Reads: nothing.
+// Provides: sun_clear: which hits nothing keeps from a sun; sun_geometry.
+// Needs: reach.cl, triangle.cl, structs.  Reads: SUN_SHARED (SHARED_DIRECTION: planes along every sun's direction are at hand; or SHARED_NOTHING).
+//
+// All rays to a sun run along D, so where they pass an edge from b to c is told by where they start: on which side of the plane through
+// the edge along D. It has the normal M = D x (c - b), and p.M + K, K = -(b + c).M / 2, is D.((b - p) x (c - p)), the edge function of the ray from p:
+// three products and a constant, computed from the given numbers in float64 and rounded once. Seen from the triangle beyond the edge, b and c
+// change places, and every number its sign and nothing else.
+//   With corners and p relative to the local origin, the roundings of M and K and those of products and sums are below (1 + 4)u (|p||M| + |K|),
+//   and |K| is at most |M| times the farther corner. The float64 error is below 4 * 2^-53 |c - b| in M, and with the sum and the products
+//   of K below 16 * 2^-53 (|p| + |corner|) |c - b| in all. With reach >= |p| + |corner|, `bound` = 8u max|M| + 16 * 2^-53 max|c - b| times reach holds.
+// The distance is that of rays of any origin: it is asked for where a test is all but a hit.
 
+// What rays to a sun meet: everything, as seen along its direction.
+HOT Geometry sun_geometry(const Geometry *geometry, int index) {
+    Geometry along = *geometry;
+    if (SUN_SHARED == SHARED_DIRECTION) along.parallel = geometry->sun_planes + (size_t)index * geometry->slot_count;
+    //@ sun_geometry
+    return along;
+}
+
+HOT mask_n sun_clear(const Geometry *geometry, int index, const Rays *rays, const Hit *hit, const real_n *to_light, const int from_eye, real extent,
+                     mask_n lit) {
+    const Geometry along = sun_geometry(geometry, index);
+    return reach_trace(&along, rays, hit, to_light, 0, to_light, (real_n)0, from_eye, extent, SUN_SHARED, lit);
+}
+
+#define PREPARE_PARALLEL 6
+
+static __attribute__((noinline)) void prepare_parallel(global const double *vertices, int slot, const double *origin, const double *along, global ParallelPlanes *plane) {
+    double corner[3][3], edge[3], normal[3][4], steepest = 0, longest = 0;
+    for (int c = 0; c < 3; c++)
+        for (int a = 0; a < 3; a++) corner[c][a] = vertices[9 * (size_t)slot + 3 * c + a] - origin[a];
+    for (int c = 0; c < 3; c++) {
+        const double *b = corner[(c + 1) % 3], *e = corner[(c + 2) % 3];
+        double sum[3];
+        for (int a = 0; a < 3; a++) {
+            edge[a] = e[a] - b[a];
+            sum[a] = b[a] + e[a];
+        }
+        cross_double(along, edge, normal[c]);
+        normal[c][3] = -0.5 * dot_double(sum, normal[c]);
+        steepest = fmax(steepest, sqrt(dot_double(normal[c], normal[c])));
+        longest = fmax(longest, sqrt(dot_double(edge, edge)));
+    }
+    for (int a = 0; a < 4; a++) {
+        plane->u[a] = (real)normal[0][a];
+        plane->v[a] = (real)normal[1][a];
+        plane->w[a] = (real)normal[2][a];
+    }
+    plane->bound = (real)(8 * UNIT_ROUNDOFF * steepest + 16 * 0x1p-53 * longest);
+}
+
+//@hook geometry_members
+    global const ParallelPlanes *sun_planes;  // slot_count a sun
+    global const ParallelPlanes *parallel;    // a slot each, seen along the direction that rays share
+//@end
+//@hook begin
+    geometry.sun_planes = sun_planes;
+//@end
+//@hook edge_functions
+    else if (shared == SHARED_DIRECTION) {
+        global const ParallelPlanes *plane = geometry->parallel + slot;
+        u = place_uniform(rays->origin, plane->u);
+        v = place_uniform(rays->origin, plane->v);
+        w = place_uniform(rays->origin, plane->w);
+        f.bound = reach * plane->bound;
+    }
+//@end
+//@hook fetch_test
+    else if (shared == SHARED_DIRECTION) fetch_ahead(geometry->parallel + slot);
+//@end
+//@hook prepare_parameters
+                    , global ParallelPlanes *parallel, double4 along
+//@end
+//@hook prepare
+    const double direction[3] = {along.x, along.y, along.z};
+    if (what == PREPARE_PARALLEL) prepare_parallel(vertices, item, origin, direction, parallel + first + item);
+//@end
 //@hook sun_visible
         mask_n clear = NO_LANES;
         //@ sun_known
-        if (any_lane(lit)) lit = reach_clear(geometry, rays, hit, to_light, from_eye, extent, lit);
+        if (any_lane(lit)) lit = sun_clear(geometry, i, rays, hit, to_light, from_eye, extent, lit);
         lit |= clear;
 //@end

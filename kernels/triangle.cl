@@ -1,4 +1,4 @@
-// Provides: edge_functions: on which side of a triangle's three edges its rays pass; plane_hit; ray_given.
+// Provides: edge_functions: on which side of a triangle's three edges its rays pass; fetch_test; plane_hit; ray_given.
 // Needs: lanes.cl, rays.cl, geometry.cl.  Reads: nothing.
 //
 // Rays that share their origin o (the eye, a point light) use planes through o and each edge, N = b x c of the corners seen from o,
@@ -23,7 +23,9 @@ HOT EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, rea
         v = dot_uniform(rays->direction, plane->v);
         w = dot_uniform(rays->direction, plane->w);
         f.bound = (real_n)plane->bound;
-    } else {
+    }
+    //@ edge_functions
+    else {
 #pragma OPENCL FP_CONTRACT ON
         global const Triangle *triangle = geometry->triangles + slot;
         const real_n *d = rays->direction;
@@ -39,6 +41,13 @@ HOT EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, rea
     f.lowest = min_n(min_n(u, v), w);
     f.highest = max_n(max_n(u, v), w);
     return f;
+}
+
+// Asks memory for what a test reads first.
+HOT void fetch_test(const Geometry *geometry, int slot, const int shared) {
+    if (shared == SHARED_ORIGIN) fetch_ahead(geometry->planes + slot);
+    //@ fetch_test
+    else fetch_ahead(geometry->triangles + slot);
 }
 
 // The distance to the triangle's plane, t = offset / rate with offset = n.(v0 - o), rate = n.d.

@@ -45,6 +45,7 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
     const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared);
     mask_n hit = live & (is_at_least(f.lowest, -f.bound) | is_at_most(f.highest, f.bound));
     if (!any_lane(hit)) return;
+    hit &= ~is_equal(rays->skip, (mask_n)slot);  // before float64 is asked: a ray lies in its own triangle's plane, to within its error
     const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared);
     real_n t = plane.t;
     // Where float32 cannot tell whether the hit lies before the ray's start, float64 does.
@@ -65,7 +66,7 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
     }
     mask_n closer = is_less(t, hits->t);
     //@ tie
-    hit &= is_greater(t, rays->t_min) & closer & ~is_equal(rays->skip, (mask_n)slot);
+    hit &= is_greater(t, rays->t_min) & closer;
     //@ accept
     hits->t = choose(hit, t, hits->t);
     hits->slot = choose(hit, (mask_n)slot, hits->slot);

@@ -46,6 +46,12 @@ def edge_planes(real: type) -> np.dtype[np.void]:
                          ("normal_bound", real), ("offset_bound", real)])  # fmt: skip
 
 
+def parallel_planes(real: type) -> np.dtype[np.void]:
+    """A triangle for rays of one shared direction: normals and constants of the planes through each edge along it. 64 bytes in float32."""
+    plane: Any = (real, (4,))
+    return struct_dtype([("u", *plane), ("v", *plane), ("w", *plane), ("bound", real), ("unused", real, (3,))])
+
+
 def direction_boxes() -> np.dtype[np.void]:
     """Bounds of the directions in which BOXES triangles, or records of such, lie from a shared origin, in steps (directions.cl); how near
     they are; slots, or numbers of records. 320 bytes.

@@ -12,7 +12,7 @@ from clrt.device.arrays_wide import wide_trees
 from clrt.device.session import Buffers, multiple
 
 LOCAL = 64
-_TRIANGLES, _PLANES, _DIRECTIONS, _UNIONS, _PLACES, _PLACED = map(np.int32, range(6))
+_TRIANGLES, _PLANES, _DIRECTIONS, _UNIONS, _PLACES, _PLACED, _PARALLEL = map(np.int32, range(7))
 _OUTERMOST = 32000  #: steps to the direction farthest from the middle: an int16 holds all
 
 
@@ -53,6 +53,9 @@ class _Launches:
         if "light_planes" in buffers.effects and buffers.shared_lights:
             for i, light in enumerate(self.lights):
                 self._launch(_PLANES, packed.slots, light, i * packed.slots, packed.slots, planes=buffers.effects["light_planes"])
+        if "sun_planes" in buffers.effects and program.suns_share(buffers.features, buffers.shared_lights):
+            for i, sun in enumerate(packed.scene.suns):
+                self._launch(_PARALLEL, packed.slots, packed.origin, i * packed.slots, packed.slots, along=np.asarray(sun.direction))
         if buffers.boxes and buffers.box_count:
             self._directions(self.eye, buffers.boxes["eye"], 0)
             for i, light in enumerate(self.lights[: program.LIGHTS_SEEN] if "lights" in buffers.boxes else ()):
@@ -61,23 +64,26 @@ class _Launches:
                 self._places(np.asarray(sun.direction), buffers.boxes["suns"], i * buffers.box_count)
 
     def _launch(self, what: np.int32, items: int, origin: NDArray[np.float64], first: int, end: int, *, planes: Any = None,
-                of_boxes: tuple[Any, ...] = ()) -> None:  # fmt: skip
+                of_boxes: tuple[Any, ...] = (), along: NDArray[np.float64] | None = None, frame: NDArray[np.float32] | None = None
+                ) -> None:  # fmt: skip
+        """The kernel's arguments: those of all scenes, then those of files, in the order of the program."""
         buffers = self.buffers
-        if buffers.boxes and not of_boxes:
-            of_boxes = self._of_boxes(np.zeros(4, np.float32), buffers.boxes["eye"])
         size = (multiple(max(items, self.least), LOCAL),)
         records = buffers.triangles, buffers.eye_planes if planes is None else planes
-        given = what, buffers.vertices, np.array([*origin, 0.0]), *records, np.int32(first), np.int32(end), *of_boxes
-        self.kernel(buffers.device.queue, size, (LOCAL,), *given, *self.of_places)
+        given = [what, buffers.vertices, _four(origin), *records, np.int32(first), np.int32(end)]
+        if buffers.boxes:
+            given += of_boxes or self._of_boxes(np.zeros(4, np.float32), buffers.boxes["eye"])
+        given += self.of_places
+        if "sun_planes" in buffers.effects:
+            # The direction that rays have: rounded as theirs.
+            direction = np.zeros(3) if along is None else along.astype(buffers.precision.real).astype(np.float64)
+            given += buffers.effects["sun_planes"], _four(direction)
+        if "suns" in buffers.boxes:
+            given += buffers.upload(np.zeros(13, np.float32) if frame is None else frame), _four(buffers.packed.origin)
+        self.kernel(buffers.device.queue, size, (LOCAL,), *given)
 
-    def _of_boxes(
-        self, scale: NDArray[np.float32], boxes: Any, below: int = 0, count: int = 0, frame: NDArray[np.float32] | None = None
-    ) -> tuple[Any, ...]:
-        given = self.blocks, scale, boxes, np.int32(below), np.int32(count)
-        if "suns" not in self.buffers.boxes:
-            return given
-        axes = self.buffers.upload(np.zeros(13, np.float32) if frame is None else frame)
-        return *given, axes, np.array([*self.buffers.packed.origin, 0.0])
+    def _of_boxes(self, scale: NDArray[np.float32], boxes: Any, below: int = 0, count: int = 0) -> tuple[Any, ...]:
+        return self.blocks, scale, boxes, np.int32(below), np.int32(count)
 
     def _directions(self, origin: NDArray[np.float64], boxes: Any, first: int) -> None:
         """Of blocks, then of the records above them."""
@@ -92,7 +98,7 @@ class _Launches:
         packed = self.buffers.packed
         items = self.buffers.box_levels[0] * layout.BOXES
         frame = place_frame(direction, packed.objects)
-        self._launch(_PLACES, items, self.eye, first, items, of_boxes=self._of_boxes(frame[:4], boxes, frame=frame))
+        self._launch(_PLACES, items, self.eye, first, items, of_boxes=self._of_boxes(frame[:4], boxes), frame=frame)
         self._unions(boxes, first)
 
     def _unions(self, boxes: Any, first: int) -> None:
@@ -114,6 +120,11 @@ class _Launches:
             buffers.device.queue, size, (LOCAL,), buffers.triangles, given, buffers.effects["wide_blocks"], np.int32(slots.size)
         )
         buffers.device.queue.finish()
+
+
+def _four(vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """As a double4."""
+    return np.array([*vector, 0.0])
 
 
 def direction_scale(origin: NDArray[np.float64], objects: NDArray[np.void]) -> NDArray[np.float32]:

@@ -42,6 +42,7 @@ GROUP = (4, 2)  #: packets of a work-item that go together, across and down
 GROUPS_FROM = 256  #: triangles; measured: with few, the rest of the work is as much as the tests that are saved
 LIGHTS_SEEN = 31  #: lights, and suns, whose shadow rays from what the eye sees go together: a bit of an int each
 GROUP_STACK = 15 * 7 + 1  #: entries: for 7 levels of records, more than 2^27 blocks have
+SHARED_NOTHING, SHARED_DIRECTION = 0, 2  #: what rays to suns share, by the numbers of rays.cl
 LOCAL_SIZE = (8, 2)  #: measured fastest on PoCL among 1x1 to 64x1; one size, since PoCL compiles again for each
 PRIVATE_LIMIT = 6 << 20  #: bytes a work-group may hold: PoCL keeps them on a thread's stack of 8 MiB and faults beyond
 RUN = 32  #: rays of a work-item in arrays of rays
@@ -72,7 +73,7 @@ class Shape:
 
     stack : entries of the traversal stack, at least the depth of the deepest tree
     depth : greatest number of bounces
-    shared_lights : whether edge planes as seen from the lights are at hand
+    shared_lights : whether edge planes as seen from the lights, and along suns, are at hand
     tree : entries of the stack of the tree over boxes, at least its depth
     block : of arrays of rays, the triangles that are tested at once
     wide : entries of the stack of wide trees, at least the depth of the deepest
@@ -122,6 +123,11 @@ def suns_grouped(features: Features, lanes: int, shape: Shape) -> bool:
     return shape.groups and lanes > 1 and "sun shadows" in names and names.isdisjoint(("opacity shadows", "fog"))
 
 
+def suns_share(features: Features, shared_lights: bool) -> bool:
+    """Whether rays to suns are tested by planes along their direction (sun_visible.cl): not through objects of other spaces than the world's."""
+    return shared_lights and "placed" not in {f.name for f in features.active}
+
+
 def item_size(lanes: int, groups: bool) -> tuple[int, int]:
     """Pixels of a work-item of `render`: width and height."""
     width, height = PACKETS[lanes]
@@ -151,7 +157,7 @@ def _structs(features: Features, precision: Precision, lanes: int, shape: Shape,
     ]  # fmt: skip
     declared = " ".join(declaration for f in features.active for _, declaration in f.parameters)
     optional = (
-        ("Light", partial(light_dtype, features)), ("Sphere", layout.sphere), ("Texture", layout.texture), ("Sun", layout.sun),
+        ("ParallelPlanes", layout.parallel_planes), ("Light", partial(light_dtype, features)), ("Sphere", layout.sphere), ("Texture", layout.texture), ("Sun", layout.sun),
         ("Emitter", layout.emitter), ("Placement", layout.placement), ("EnvironmentRow", layout.environment_row),
     )  # fmt: skip
     names += [(name, make(real)) for name, make in optional if f" {name} " in declared]
@@ -196,6 +202,8 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
         values |= {"TILE_WIDTH": TILE[0], "TILE_HEIGHT": TILE[1]}
     if "shadows" in names:
         values["SHADOW_SHARED_ORIGIN"] = int(shape.shared_lights)
+    if "sun shadows" in names:
+        values["SUN_SHARED"] = SHARED_DIRECTION if suns_share(features, shape.shared_lights) else SHARED_NOTHING
     if "bounce" in names:
         values["BOUNCE_STACK"] = bounce_stack(features, shape.depth)
     if "object tree" in names:

@@ -20,6 +20,7 @@ from clrt.scene.model import Scene
 
 FILM_BYTES = 12  #: a pixel of the film: three float32
 _WRITTEN = ("sample_sums", "wide_blocks")  #: arrays of effects that kernels fill
+_PLANES = ("light_planes", "sun_planes")  #: those that prepare.cl fills before
 
 
 def check_buffer(device: Device, size: int, what: str) -> None:
@@ -40,16 +41,20 @@ def check_picture(device: Device, width: int, height: int) -> None:
 
 
 def shares_lights(scene: Scene, precision: Precision, device: Device, slots: int | None = None) -> bool:
-    """Whether edge planes of every light, of so many slots (default: of all triangles), fit in the device's memory."""
+    """Whether edge planes of every light and sun, of so many slots (default: of all triangles), fit in the device's memory."""
     count = scene.triangle_count if slots is None else slots
-    size = max(1, count) * layout.edge_planes(precision.real).itemsize * len(scene.lights_with_position)
-    return bool(size <= min(device.handle.max_mem_alloc_size, device.handle.global_mem_size // 4))
+    from_lights = max(1, count) * layout.edge_planes(precision.real).itemsize * len(scene.lights_with_position)
+    along_suns = max(1, count) * layout.parallel_planes(precision.real).itemsize * len(scene.suns)
+    return bool(
+        max(from_lights, along_suns) <= device.handle.max_mem_alloc_size
+        and from_lights + along_suns <= device.handle.global_mem_size // 4
+    )
 
 
 class Buffers:
     """The device's copy of a packed scene.
 
-    groups : whether packets of its pictures go together; shared_lights : whether edge planes of every light fit in memory
+    groups : whether packets of its pictures go together; shared_lights : whether edge planes of every light and sun fit in memory
     """
 
     def __init__(self, device: Device, packed: Packed, features: Features, precision: Precision, groups: bool = False) -> None:
@@ -58,7 +63,6 @@ class Buffers:
         self.lanes = precision.lanes(device.info.lanes)
         self.groups = groups and self.lanes > 1
         self.plane_bytes = max(1, packed.slots) * layout.edge_planes(precision.real).itemsize
-        lights = len(packed.scene.lights_with_position)
         self.shared_lights = shares_lights(packed.scene, precision, device, packed.slots)
         self._check_memory()
         self.frame = self.upload(packed.frame)
@@ -66,13 +70,11 @@ class Buffers:
         self.core = [self.upload(a) for a in (packed.nodes, packed.indices, packed.objects, packed.surfaces, packed.materials)]
         self.effects = {
             name: self.upload(np.zeros(0, np.int32) if features.idle(f) else PACKERS[name](packed), writable=name in _WRITTEN)
-            for f in features.active for name, _ in f.parameters if name != "light_planes"
+            for f in features.active for name, _ in f.parameters if name not in _PLANES
         }
         self.triangles = self.empty(max(1, packed.slots) * layout.triangle(precision.real).itemsize)
         self.eye_planes = self.empty(self.plane_bytes)
-        with_shadows = any(name == "light_planes" for f in features.active for name, _ in f.parameters)
-        if with_shadows:
-            self.effects["light_planes"] = self.empty(self.plane_bytes * (max(1, lights) if self.shared_lights else 1))
+        self.effects |= {name: self._planes(name) for f in features.active for name, _ in f.parameters if name in _PLANES}
         #: boxes of directions as seen from the eye, of those from all lights, and along all suns, where the program reads them; where the
         #: device has no room for them there are no levels of them, and packets go alone
         self.box_levels: list[int] = []
@@ -95,6 +97,15 @@ class Buffers:
     def box_count(self) -> int:
         """Records of boxes as seen from one origin, and the one in front of them that tells how directions are measured; or 0."""
         return 1 + sum(self.box_levels) if self.box_levels else 0
+
+    def _planes(self, name: str) -> Any:
+        """Room for the planes of every light or sun; for one record where rays do without."""
+        real, scene = self.precision.real, self.packed.scene
+        if name == "light_planes":
+            record, origins = layout.edge_planes(real), len(scene.lights_with_position) if self.shared_lights else 0
+        else:
+            record, origins = layout.parallel_planes(real), len(scene.suns) if program.suns_share(self.features, self.shared_lights) else 0
+        return self.empty(record.itemsize * max(1, self.packed.slots * origins))
 
     def _boxes(self) -> tuple[list[int], dict[str, Any]]:
         """How many records each level has as seen from one origin, and room for those of all, in the order of the program's arguments."""

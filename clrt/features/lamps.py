@@ -62,6 +62,7 @@ SUN_SHADOWS = Feature(
     "sun shadows",
     lambda scene: sun_caller(scene) if can_shadow(scene) else None,
     "sun_visible.cl",
+    parameters=(("sun_planes", "global const ParallelPlanes *sun_planes"),),
     rays=("shadow",),
     needs=(SUN,),
 )
