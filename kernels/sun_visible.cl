@@ -26,16 +26,16 @@ HOT mask_n sun_clear(const Geometry *geometry, int index, const Rays *rays, cons
 
 #define PREPARE_PARALLEL 6
 
-static __attribute__((noinline)) void prepare_parallel(global const double *vertices, int slot, const double *origin, const double *along, global ParallelPlanes *plane) {
-    double corner[3][3], edge[3], normal[3][4], steepest = 0, longest = 0;
-    for (int c = 0; c < 3; c++)
-        for (int a = 0; a < 3; a++) corner[c][a] = vertices[9 * (size_t)slot + 3 * c + a] - origin[a];
+static __attribute__((noinline)) void prepare_parallel(global const double *vertices, int slot, const double *origin, const double *along,
+                                                       global ParallelPlanes *plane) {
+    global const double *v = vertices + 9 * (size_t)slot;
+    double normal[3][4], steepest = 0, longest = 0;
     for (int c = 0; c < 3; c++) {
-        const double *b = corner[(c + 1) % 3], *e = corner[(c + 2) % 3];
-        double sum[3];
+        const int from = 3 * ((c + 1) % 3), to = 3 * ((c + 2) % 3);
+        double edge[3], sum[3];
         for (int a = 0; a < 3; a++) {
-            edge[a] = e[a] - b[a];
-            sum[a] = b[a] + e[a];
+            edge[a] = v[to + a] - v[from + a];  // of the given numbers: relative to the origin they are rounded
+            sum[a] = (v[from + a] - origin[a]) + (v[to + a] - origin[a]);
         }
         cross_double(along, edge, normal[c]);
         normal[c][3] = -0.5 * dot_double(sum, normal[c]);

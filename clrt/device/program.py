@@ -50,7 +50,8 @@ SORT_BITS = 3  #: an axis, of the grid of origins by which rays are sorted; meas
 WIDE_STACK = 16  #: entries of the stack of wide trees, where none is deeper: with 16 children a node, few are
 MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
 #: what stands at a place where no effect adds anything
-_DEFAULTS = {"trace": "        //@ eye_trace", "eye_trace": "        scene_trace(&geometry, &rays, SHARED_ORIGIN, 0, &hits);", "next": "        break;",
+_DEFAULTS = {"trace": "        //@ eye_trace", "next": "        break;",
+             "eye_trace": "        scene_trace(&geometry, &rays, SHARED_ORIGIN, 0, &hits);",
              "shadow_trace": "    scene_trace(&seen, &rays, SHADOW_SHARED_ORIGIN, 1, &hits);",
              "tie": "    closer |= is_equal(t, hits->t) & is_less((mask_n)slot, hits->slot);",
              "eye_rays": "    //@ camera", "camera": "    camera_rays(frame, column, row, &rays);",
@@ -124,7 +125,7 @@ def suns_grouped(features: Features, lanes: int, shape: Shape) -> bool:
 
 
 def suns_share(features: Features, shared_lights: bool) -> bool:
-    """Whether rays to suns are tested by planes along their direction (sun_visible.cl): not through objects of other spaces than the world's."""
+    """Whether rays to suns are tested by planes along their direction (sun_visible.cl): not where objects have spaces of their own."""
     return shared_lights and "placed" not in {f.name for f in features.active}
 
 
@@ -157,7 +158,8 @@ def _structs(features: Features, precision: Precision, lanes: int, shape: Shape,
     ]  # fmt: skip
     declared = " ".join(declaration for f in features.active for _, declaration in f.parameters)
     optional = (
-        ("ParallelPlanes", layout.parallel_planes), ("Light", partial(light_dtype, features)), ("Sphere", layout.sphere), ("Texture", layout.texture), ("Sun", layout.sun),
+        ("ParallelPlanes", layout.parallel_planes), ("Light", partial(light_dtype, features)), ("Sphere", layout.sphere),
+        ("Texture", layout.texture), ("Sun", layout.sun),
         ("Emitter", layout.emitter), ("Placement", layout.placement), ("EnvironmentRow", layout.environment_row),
     )  # fmt: skip
     names += [(name, make(real)) for name, make in optional if f" {name} " in declared]

@@ -46,8 +46,7 @@ def shares_lights(scene: Scene, precision: Precision, device: Device, slots: int
     from_lights = max(1, count) * layout.edge_planes(precision.real).itemsize * len(scene.lights_with_position)
     along_suns = max(1, count) * layout.parallel_planes(precision.real).itemsize * len(scene.suns)
     return bool(
-        max(from_lights, along_suns) <= device.handle.max_mem_alloc_size
-        and from_lights + along_suns <= device.handle.global_mem_size // 4
+        max(from_lights, along_suns) <= device.handle.max_mem_alloc_size and from_lights + along_suns <= device.handle.global_mem_size // 4
     )
 
 
@@ -70,7 +69,9 @@ class Buffers:
         self.core = [self.upload(a) for a in (packed.nodes, packed.indices, packed.objects, packed.surfaces, packed.materials)]
         self.effects = {
             name: self.upload(np.zeros(0, np.int32) if features.idle(f) else PACKERS[name](packed), writable=name in _WRITTEN)
-            for f in features.active for name, _ in f.parameters if name not in _PLANES
+            for f in features.active
+            for name, _ in f.parameters
+            if name not in _PLANES
         }
         self.triangles = self.empty(max(1, packed.slots) * layout.triangle(precision.real).itemsize)
         self.eye_planes = self.empty(self.plane_bytes)
