@@ -9,7 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from clrt import renderer
+from clrt.device import program
 from clrt.device.context import Device
+from clrt.device.prepare import prepare
+from clrt.device.session import Tracer
 from clrt.features import Features
 from clrt.precision import rung
 from clrt.reference import render as reference
@@ -26,6 +29,23 @@ def in_packets(scene: Scene, device: Device, lanes: int, precision: str = "water
     tracer = renderer.open_tracer(prepared, Features.of(scene), rung(precision), narrow, _quiet)[1]
     renderer.run_rows(tracer, "render", _quiet)
     return tracer.picture()
+
+
+def ray_counts(
+    scene: Scene, device: Device, precision: str = "watertight", features: Features | None = None, samples: int | None = None
+) -> tuple[dict[str, int], list[int]]:
+    """Rays by kind, and tests by object: by the counting program alone, where `render(count=True)` needs the other one, too."""
+    features = Features.of(scene) if features is None else features
+    scene = renderer.with_options(scene, None, None, samples, 0)
+    prepared = renderer.build_trees(scene, "sah", _quiet)
+    buffers, _, _ = renderer.fill_buffers(prepared, features, rung(precision), device)
+    shape = renderer.program_shape(prepared, features, buffers.shared_lights, buffers.wide_stack)
+    built = program.build(device, program.compose(features, buffers.precision, buffers.lanes, shape, counting=True))
+    prepare(buffers, built)
+    tracer = Tracer(buffers, built, counting=True)
+    renderer.run_rows(tracer, "count", _quiet)
+    kinds = features.ray_kinds
+    return dict(zip(kinds, tracer.counts.tolist(), strict=False)), tracer.counts[len(kinds) :].tolist()
 
 
 def writer(folder: Path) -> Write:

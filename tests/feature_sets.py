@@ -6,6 +6,7 @@ import itertools
 import random
 import re
 from collections.abc import Iterable
+from functools import cache, lru_cache
 
 from clrt.device.program import kernel_folder
 from clrt.features import FEATURES, Feature, Features
@@ -64,20 +65,29 @@ _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
 _STRUCTS = re.compile(r'#line 1 "structs"\n(.*?)#line', re.S)
 
 
-def own_names(feature: Feature) -> set[str]:
+@lru_cache(maxsize=4)
+def _read(source: str) -> tuple[str, frozenset[str], frozenset[str]]:
+    """The text of the structs, all words of the code, the files that it is from."""
+    words = frozenset(re.findall(r"\w+", _COMMENT.sub("", source)))
+    return _STRUCTS.findall(source)[0], words, frozenset(re.findall(r'#line \d+ "([^"]*)"', source))
+
+
+@cache
+def own_names(feature: Feature) -> frozenset[str]:
     """What a feature's file defines: functions, macros, types; and the kernel arguments that it adds."""
     return (_defined(feature.kernel) | {name for name, _ in feature.parameters}) - _defined(feature.replaces)
 
 
-def _defined(file: str) -> set[str]:
+@cache
+def _defined(file: str) -> frozenset[str]:
     text = (kernel_folder() / file).read_text(encoding="utf-8") if file else ""
-    return {name for pattern in (_FUNCTION, _MACRO, _TYPE) for name in pattern.findall(text)}
+    return frozenset(name for pattern in (_FUNCTION, _MACRO, _TYPE) for name in pattern.findall(text))
 
 
 def traces(feature: Feature, source: str) -> list[str]:
     """What a composed program holds of a feature: its file, names that it defines, members of structs. Comments are no code."""
-    structs, code = _STRUCTS.findall(source)[0], _COMMENT.sub("", source)
-    files = [feature.kernel] if re.search(rf'#line \d+ "{re.escape(feature.kernel)}"', source) else []
+    structs, words, names = _read(source)
+    files = [feature.kernel] if feature.kernel in names else []
     members = {name for name, *_ in (*feature.material, *feature.light, *feature.frame)}
-    found = [name for name in sorted(own_names(feature)) if re.search(rf"\b{name}\b", code)]
+    found = sorted(own_names(feature) & words)
     return files + found + [name for name in sorted(members) if re.search(rf" {name}(\[\d+\])?;", structs)]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from device_pictures import in_packets
+from device_pictures import in_packets, ray_counts
 
 import clrt
 from clrt import renderer
@@ -372,17 +372,13 @@ def test_lone_triangle_is_lit_without_rays() -> None:
     assert Features.of(scene).effects == ("environment", "environment light")
 
 
-def test_rays_to_the_environment_are_traced_only_where_it_can_light() -> None:
+def test_rays_to_the_environment_are_traced_only_where_it_can_light(device: Device) -> None:
     """Light from above alone: the lower half of a ball's picture sends no rays up, nor does what the eye does not meet."""
     radiance = np.zeros((2, 1, 3))
     radiance[0] = 1.0
     down = "E 0 -5 0\nV 0 1 0 0 0 1\nF 5\nR 8 8\nM 1 1 1 0 1 0 1 0\nS 0 0 0 1\n"
-    stats = clrt.render(lit(down, radiance), samples=4, count=True).stats
-    assert stats is not None
-    assert stats.ray_counts is not None
-    assert stats.ray_counts["primary"] == 256
-    assert stats.ray_counts["shadow"] < 32, "a cap of 13 degrees about the lowest point sees the sky under its rim alone"
-    from_above = clrt.render(lit(down.replace("E 0 -5 0\nV 0 1 0", "E 0 5 0\nV 0 -1 0"), radiance), samples=4, count=True).stats
-    assert from_above is not None
-    assert from_above.ray_counts is not None
-    assert from_above.ray_counts["shadow"] > 224
+    counts, _ = ray_counts(lit(down, radiance), device, samples=4)
+    assert counts["primary"] == 256
+    assert counts["shadow"] < 32, "a cap of 13 degrees about the lowest point sees the sky under its rim alone"
+    from_above = lit(down.replace("E 0 -5 0\nV 0 1 0", "E 0 5 0\nV 0 -1 0"), radiance)
+    assert ray_counts(from_above, device, samples=4)[0]["shadow"] > 224

@@ -44,7 +44,7 @@ def _agrees(scene: Scene, pixels: np.ndarray, seed: int, bits: int, precision: s
     assert wrong.sum() <= 0.02 * wrong.size
 
 
-@pytest.mark.matrix(keep=3)
+@pytest.mark.matrix(keep=2)
 @pytest.mark.parametrize("precision", sorted(RUNGS))
 @pytest.mark.parametrize("text", [FLAT, BOUNCING, OBLIQUE], ids=["flat", "bouncing", "oblique"])
 def test_samples_match_the_reference(text: str, precision: str) -> None:

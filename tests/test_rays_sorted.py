@@ -142,7 +142,7 @@ def test_rays_of_a_camera_are_in_order_and_scattered_ones_are_not() -> None:
     assert not ray_sort.in_order_already(np.full((40_000, 3), np.nan), np.full((40_000, 3), np.nan), 1.0)
 
 
-@pytest.mark.matrix(keep=5)
+@pytest.mark.matrix(keep=3)
 @pytest.mark.parametrize("without", ["__AVX512DQ__", "__AVX__"])
 @pytest.mark.parametrize("width", [4, 8, 16])
 @pytest.mark.parametrize("rung", ["exact", "double"])

@@ -90,11 +90,11 @@ def test_monkey_matches_reference(shared_scene: object, tree: str) -> None:
 
 
 def test_rabbit_like_mesh_matches_reference() -> None:
-    vertices, faces = rabbit_like(2000, seed=3)
+    vertices, faces = rabbit_like(1000, seed=3)
     corners = vertices[faces]
     corners = (corners - corners.mean((0, 1))) / np.ptp(corners, (0, 1)).max() * 1.4 + (0, 0, 1.5)
     lines = "".join("T " + " ".join(map(repr, row)) + "\n" for row in corners.reshape(-1, 9).tolist())
-    scene = parse_scene(CAMERA.replace("64 64", "96 96") + PLAIN + lines + "O\n" + FLOOR)
+    scene = parse_scene(CAMERA.replace("64 64", "72 72") + PLAIN + lines + "O\n" + FLOOR)
     _compare(scene, clrt.render(scene).pixels)
 
 

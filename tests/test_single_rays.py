@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from device_pictures import ray_counts
 from numpy.typing import NDArray
 from ray_meshes import doubled, sphere
 
 from clrt.device import program
 from clrt.device.context import Device
-from clrt.device.session import Tracer
 from clrt.features import Features
 from clrt.features.single import BLOCKS, SAMPLES_A_TRIANGLE, SINGLE
 from clrt.precision import RUNGS, rung
-from clrt.renderer import Prepared, build_trees, open_tracer, program_shape, run_rows
+from clrt.renderer import Prepared, build_trees, open_tracer, run_rows
 from clrt.scene.build import parse_scene
 from clrt.scene.model import Scene
 
@@ -97,18 +97,12 @@ def test_other_rungs_differ_where_edges_are_tied_alone(name: str, precision: str
 def test_counts_are_those_of_packets(device: Device) -> None:
     """As many rays of each kind; tests are those of the triangles in blocks."""
     scene = parse_scene(SCENES["indirect"])
-    prepared, counts = build_trees(scene, "sah", silent), []
+    counts = []
     for features in (Features.of(scene), in_packets(Features.of(scene))):
-        buffers = open_tracer(prepared, features, rung("exact"), device, silent)[0]
-        lanes, shape = buffers.precision.lanes(device.info.lanes), program_shape(prepared, features, buffers.shared_lights)
-        source = program.compose(features, buffers.precision, lanes, shape, counting=True)
-        tracer = Tracer(buffers, program.build(device, source), counting=True)
-        run_rows(tracer, "count", silent)
-        kinds = len(features.ray_kinds)
-        counts.append((tracer.counts[:kinds].tolist(), tracer.counts[kinds:].tolist()))
+        counts.append(ray_counts(scene, device, "exact", features))
     (single, single_tests), (packets, packet_tests) = counts
     assert single == packets
-    assert all(0 < tests < most for tests, most in zip(single_tests, np.array([300, 12, 2]) * sum(single), strict=True))
+    assert all(0 < tests < most for tests, most in zip(single_tests, np.array([300, 12, 2]) * sum(single.values()), strict=True))
     assert single_tests != packet_tests
 
 
