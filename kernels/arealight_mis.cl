@@ -15,7 +15,7 @@ HOT real_n arealight_chance(const Geometry *geometry, global const Frame *frame,
 //@hook arealight_share
                 // A drawn ray met the light by chance: the samples of lights bring the rest.
                 share = choose(is_greater(current.pdf, (real_n)0),
-                               mis_drawn_share(current.pdf, arealight_chance(&geometry, frame, &rays, &hit, glow, current.before)), (real_n)1);
+                               mis_drawn_share(&geometry, current.pdf, arealight_chance(&geometry, frame, &rays, &hit, glow, current.before)), (real_n)1);
                 real_n known;  // to the samples of lights
                 gather(known, (real)materials[hit.material[k]].emission_drawn);
                 share = choose(is_greater(known, (real_n)0), share, (real_n)1);

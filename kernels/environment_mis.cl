@@ -7,7 +7,7 @@
                 // The samples of the environment bring the rest.
                 real_n chance;
                 gather(chance, environment_chance(frame, environment_rows, environment_columns, (int)cell[k]));
-                const real_n share = choose(drawn_there, mis_drawn_share(current.pdf, chance), (real_n)1);
+                const real_n share = choose(drawn_there, mis_drawn_share(&geometry, current.pdf, chance), (real_n)1);
                 for (int a = 0; a < 3; a++) sky[a] *= share;
             }
 //@end

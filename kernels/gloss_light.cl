@@ -17,7 +17,7 @@ HOT real_n gloss_lobe(const Geometry *geometry, global const Material *materials
     gather(mirrored, materials[hit->material[k]].reflect);
     const real_n density = ggx_met(&facets, rays->direction, to_light, &met);
     real_n value = mirrored * ggx_lobe(&facets, density, choose(lit, cosine, (real_n)1), &pdf) / facets.albedo;
-    return choose(lit, value * mis_share(chance, pdf), (real_n)0);
+    return choose(lit, value * mis_share(geometry, chance, pdf), (real_n)0);
 }
 
 //@hook scatter_lobes

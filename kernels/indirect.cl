@@ -101,6 +101,6 @@ HOT real_n indirect_scatter(global const Material *materials, const Draws *draws
         indirect_total(materials, hit, &scatter_exponent, &highlight);
         real_n density = indirect_density(rays, hit, to_light, scatter_exponent, highlight);
         //@ scattered_density
-        amount *= mis_share(chance, density);
+        amount *= mis_share(geometry, chance, density);
     }
 //@end

@@ -42,6 +42,6 @@
         const mask_n could = is_greater(cosine, (real_n)0) & is_greater(dot_n(hit->geometric, to_light), (real_n)0);
         real_n density = choose(could, drawn, (real_n)0);
         //@ scattered_density
-        matte *= mis_share(chance, density);
+        matte *= mis_share(geometry, chance, density);
     }
 //@end

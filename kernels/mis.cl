@@ -4,7 +4,7 @@
 
 // The share of the one who drew with density `mine`, where another could have drawn the same with `other`: 1 where that could not.
 // By the quotient, not by squares of densities, which overflow.
-HOT real_n mis_share(real_n mine, real_n other) {
+HOT real_n mis_share(const Geometry *geometry, real_n mine, real_n other) {
     const real_n ratio = other / mine;
     real_n share = choose(is_greater(other, (real_n)0), R(1.0) / (R(1.0) + ratio * ratio), (real_n)1);
     //@ mis_of_lights
@@ -12,8 +12,8 @@ HOT real_n mis_share(real_n mine, real_n other) {
 }
 
 // The share of a ray that was drawn with density `mine` and met a light that samples of lights draw with `other`.
-HOT real_n mis_drawn_share(real_n mine, real_n other) {
-    real_n share = mis_share(mine, other);
+HOT real_n mis_drawn_share(const Geometry *geometry, real_n mine, real_n other) {
+    real_n share = mis_share(geometry, mine, other);
     //@ mis_of_drawn
     return share;
 }

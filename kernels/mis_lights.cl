@@ -2,8 +2,10 @@
 // Needs: mis.cl.  Reads: nothing.
 
 //@hook mis_of_lights
-    share = (real_n)1;
+    //@ mis_frame
+    if (HAVE_LIGHTS_ALONE) share = (real_n)1;
 //@end
 //@hook mis_of_drawn
-    share = (real_n)0;
+    //@ mis_frame
+    if (HAVE_LIGHTS_ALONE) share = (real_n)0;
 //@end

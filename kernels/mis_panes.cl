@@ -4,8 +4,8 @@
 #define MIS_NEVER R(1e-30)  // a density beside which any other has the whole share, and no square of which is asked for
 
 //@hook scattered_density
-        density = (real_n)0;
+        if (HAVE_PANES) density = (real_n)0;
 //@end
 //@hook scattered_pushed
-                drawn->pdf = (real_n)MIS_NEVER;
+                if (HAVE_PANES) drawn->pdf = (real_n)MIS_NEVER;
 //@end

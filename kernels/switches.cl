@@ -13,3 +13,6 @@
 //@hook scatter_share
     global const Frame *frame = geometry->frame;
 //@end
+//@hook mis_frame
+    global const Frame *frame = geometry->frame;
+//@end

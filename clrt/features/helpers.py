@@ -67,9 +67,9 @@ FACETS = Feature(
 )  # fmt: skip
 MIS = Feature("mis", _all_of(_any_of(_LIGHT_DRAWING), _any_of(_RAY_DRAWING)), "mis.cl", helper=True)
 #: surfaces that let light samples through, but not rays
-LIGHTS_ALONE = Feature("lights alone", _all_of(cutouts.SHADOW_PANES, MIS), "mis_lights.cl", helper=True)
+LIGHTS_ALONE = Feature("lights alone", _all_of(cutouts.SHADOW_PANES, MIS), "mis_lights.cl", helper=True, switch=True)
 #: surfaces that let light samples through farther than rays
-PANES = Feature("panes", _all_of(cutouts.OPACITY_SEEN, MIS, sampled.INDIRECT), "mis_panes.cl", helper=True)
+PANES = Feature("panes", _all_of(cutouts.OPACITY_SEEN, MIS, sampled.INDIRECT), "mis_panes.cl", helper=True, switch=True)
 GLOSS_LIGHT = Feature("gloss light", _all_of(rough.GLOSS_MIRROR, SCATTER), "gloss_light.cl", helper=True)
 METAL_LIGHT = Feature("metal light", _all_of(rough.METAL_ROUGH, SCATTER), "metal_rough_light.cl", helper=True)
 METAL_MIS = Feature("metal mis", _all_of(METAL_LIGHT, rough.METAL_RAY), "metal_rough_mis.cl", helper=True)
