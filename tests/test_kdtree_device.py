@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +12,8 @@ import pytest
 from kdtree_meshes import F64, MESHES, lattice, needles, soup, sphere
 
 import clrt
-from clrt.device import kernel_cache
-from clrt.device.context import Device
+from clrt.device import kernel_cache, program
+from clrt.device.context import POCL, Device
 from clrt.errors import ClrtError, LimitError
 from clrt.forest import build, choose, machine, pool, subtrees, top
 from clrt.forest.machine import Machine, Store, compiled_before
@@ -220,6 +222,32 @@ def test_compiled_program_is_noted_until_the_cache_is_emptied(device: Device, tm
     assert compiled_before(device)  # this process has it still
     machine._ready.clear()  # as another process finds it
     assert not compiled_before(device)
+
+
+def test_note_is_of_all_that_decides_what_is_in_the_cache(device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """PoCL's cache may be shared: with another version of clrt or of PoCL, another environment, other options."""
+    monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
+    notes = [machine._note(device)]
+    kernels = tmp_path / "kernels"
+    shutil.copytree(str(program.kernel_folder()), kernels)
+    (kernels / "builtins.cl").write_text((kernels / "builtins.cl").read_text() + "// one more\n")
+    others = {
+        "builtins": lambda m: m.setattr(program, "kernel_folder", lambda: kernels),
+        "options": lambda m: m.setenv("PYOPENCL_BUILD_OPTIONS", "-DOTHER"),
+        "what PoCL is asked": lambda m: m.setenv("POCL_WORK_GROUP_METHOD", "cbs"),
+        "another environment": lambda m: m.setattr("pyopencl.__file__", str(tmp_path / "pyopencl" / "__init__.py")),
+        "another pyopencl": lambda m: m.setattr("pyopencl.VERSION_TEXT", "1.0"),
+    }
+    for other in others.values():
+        with monkeypatch.context() as context:
+            other(context)
+            notes.append(machine._note(device))
+    notes.append(machine._note(replace(device, info=replace(device.info, driver="another PoCL"))))
+    if device.info.platform != POCL:
+        del notes[1]  # other compilers read their own header
+    assert len(set(notes)) == len(notes)
+    monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path / "elsewhere"))
+    assert machine._note(device).name == notes[0].name
 
 
 def test_pictures_and_figures_tell_the_same_but_for_who_built(monkeypatch: pytest.MonkeyPatch) -> None:

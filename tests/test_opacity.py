@@ -23,7 +23,7 @@ MATERIAL = "M 0.9 0.8 1 0.3 0.6 0.2 20 0.1\n"
 THINGS = "T -1 -0.5 3 -0.2 0.8 3.3 0.1 -0.6 2.5\nuv -0.7 -0.3 1.4 0.2 0.5 1.9\nS 0.6 0.2 3 0.6\nS -1.5 0.5 5 0.7\n"
 PLAIN = THINGS.replace("uv -0.7 -0.3 1.4 0.2 0.5 1.9\n", "")
 CURVED = "T -1 -0.5 2.6 0 0.9 3 1 -0.5 2.6  -0.5 -0.2 -1 0 0.5 -1 0.5 -0.2 -1\n"
-#: a floor y = 0 with its light at (0, 4, 0); what lies between is in its way. The sphere below it is not seen: with it, all are of one program
+#: a floor y = 0 with its light at (0, 4, 0); what lies between is in its way. The sphere is not seen: with it, all are of one program
 BELOW = "E 0 1 -3\nV 0 -1 1\nF 60\nR 1 1\nL 0 4 0\nM 1 1 1 0 1 0 1 0\nT -50 0 -50 50 0 -50 0 0 90\nO\nS 0 -9 0 1\nM 1 1 1 0 0 0 1 0\n"
 
 

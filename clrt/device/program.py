@@ -320,6 +320,23 @@ def check_options(options: tuple[str, ...]) -> None:
             raise DeviceError(f"the build option '{option}' breaks the error bounds that the pictures rest on; leave it out")
 
 
+def cached_as(device: Device, source: str) -> tuple[str, ...]:
+    """All that decides which entry of PoCL's cache is that of `source`: two of clrt's environments may share the cache, not the entries.
+
+    The text as it is compiled, with its options, to which pyopencl adds its own folder; PoCL, its LLVM, the device, and what the
+    environment asks them for.
+    """
+    import pyopencl as cl
+
+    info = device.info
+    text, more = next(lean.attempts(kernel_folder(), source, pocl=info.platform == POCL))
+    asked = (f"{name}={os.environ[name]}" for name in sorted(os.environ) if name.startswith("POCL_") and name != kernel_cache.VARIABLE)
+    return (
+        text, *OPTIONS, *more, os.environ.get("PYOPENCL_BUILD_OPTIONS", ""), os.path.dirname(cl.__file__), cl.VERSION_TEXT,
+        info.name, info.platform, device.handle.platform.version, info.version, info.driver, *asked,
+    )  # fmt: skip
+
+
 def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> Any:
     """Compiles `source` on `device`; a pyopencl Program.
 

@@ -48,8 +48,7 @@ def is_processor(device: Device) -> bool:
 
 
 def _note(device: Device) -> Path:
-    info = device.info
-    text = "\0".join((source(), info.name, info.platform, info.version, info.driver))
+    text = "\0".join(program.cached_as(device, source()))
     return kernel_cache.compiled_note(hashlib.sha256(text.encode()).hexdigest()[:16])
 
 
