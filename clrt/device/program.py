@@ -326,13 +326,11 @@ def cached_as(device: Device, source: str) -> tuple[str, ...]:
     The text as it is compiled, with its options, to which pyopencl adds its own folder; PoCL, its LLVM, the device, and what the
     environment asks them for.
     """
-    import pyopencl as cl
-
     info = device.info
     text, more = next(lean.attempts(kernel_folder(), source, pocl=info.platform == POCL))
     asked = (f"{name}={os.environ[name]}" for name in sorted(os.environ) if name.startswith("POCL_") and name != kernel_cache.VARIABLE)
     return (
-        text, *OPTIONS, *more, os.environ.get("PYOPENCL_BUILD_OPTIONS", ""), os.path.dirname(cl.__file__), cl.VERSION_TEXT,
+        text, *OPTIONS, *more, os.environ.get("PYOPENCL_BUILD_OPTIONS", ""), str(opencl.extension_file().parent),
         info.name, info.platform, device.handle.platform.version, info.version, info.driver, *asked,
     )  # fmt: skip
 
