@@ -6,7 +6,7 @@ import atexit
 import contextlib
 import errno
 import os
-import shutil
+import stat
 from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
@@ -54,7 +54,7 @@ def _replacing(target: str, part: str) -> Iterator[None]:
     try:
         yield
         if os.path.exists(target):
-            shutil.copymode(target, part)
+            os.chmod(part, stat.S_IMODE(os.stat(target).st_mode))
         os.replace(part, target)
     finally:
         discard(part)
@@ -85,6 +85,8 @@ def temporary_folder() -> str:
 def discard_unfinished() -> None:
     """Remove what is being written, and temporary folders: for a process that is about to end without unwinding its stack."""
     for folder in tuple(_folders):
+        import shutil  # slow to import, and seldom needed
+
         shutil.rmtree(folder, ignore_errors=True)
         _folders.discard(folder)
     for part in tuple(_unfinished):

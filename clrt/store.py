@@ -7,7 +7,6 @@ bound, those that were not read for the longest are removed. Nothing here raises
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 from collections.abc import Mapping
@@ -17,6 +16,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+try:
+    from _blake2 import blake2b  # as hashlib has it, which also loads OpenSSL
+except ImportError:
+    from hashlib import blake2b
 
 Arrays = Mapping[str, NDArray[Any]]
 
@@ -30,7 +34,7 @@ _SHARE = 4  #: an entry above this part of the bound is not kept: it would drive
 
 def digest(*parts: bytes | memoryview) -> str:
     """The name of what is made of these parts, in this order; their lengths count, too."""
-    state = hashlib.blake2b(digest_size=20)
+    state = blake2b(digest_size=20)
     for part in parts:
         state.update(len(part).to_bytes(8, "little") if isinstance(part, bytes) else part.nbytes.to_bytes(8, "little"))
         state.update(part)
@@ -97,13 +101,13 @@ def _packed(arrays: Arrays) -> bytes:
     for array in arrays.values():
         parts += [bytes(-sum(map(len, parts)) % _ALIGN), array.tobytes()]
     text = b"".join(parts)
-    return text + hashlib.blake2b(text, digest_size=_DIGEST_BYTES).digest()
+    return text + blake2b(text, digest_size=_DIGEST_BYTES).digest()
 
 
 def _unpacked(data: bytes) -> dict[str, NDArray[Any]] | None:
     """What `_packed` was given, read only; None where the hash is another."""
     text = memoryview(data)[:-_DIGEST_BYTES]
-    if hashlib.blake2b(text, digest_size=_DIGEST_BYTES).digest() != data[-_DIGEST_BYTES:] or len(data) < _DIGEST_BYTES + 8:
+    if blake2b(text, digest_size=_DIGEST_BYTES).digest() != data[-_DIGEST_BYTES:] or len(data) < _DIGEST_BYTES + 8:
         return None
     place = 8 + int.from_bytes(text[:8], "little")
     arrays = {}

@@ -175,6 +175,12 @@ def test_first_runs_find_nothing_of_earlier_ones(tmp_path: Path) -> None:
     assert all(Path(own[name]).is_relative_to(tmp_path / "home") for name in ("HOME", "XDG_CACHE_HOME", "POCL_CACHE_DIR"))
 
 
+def test_programs_may_keep_compiled_modules_as_installed_ones_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else a checkout's modules would be compiled again in each run, which those of peers are not."""
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    assert "PYTHONDONTWRITEBYTECODE" not in commands.environment(tmp_path)
+
+
 def test_scripts_know_nothing_of_clrt() -> None:
     for path in sorted(commands._SCRIPTS.glob("*_picture.py")):
         assert "clrt" not in path.read_text(), path.name

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from pathlib import Path
@@ -93,18 +94,19 @@ def test_folder_is_the_users_or_a_temporary_one(tmp_path: Path, monkeypatch: pyt
     monkeypatch.delenv(kernel_cache.VARIABLE)
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    monkeypatch.setattr(kernel_cache.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
     assert str(kernel_cache.choose_folder()).startswith(str(tmp_path / "temporary"))
     monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path / "chosen"))
     assert kernel_cache.choose_folder() == tmp_path / "chosen"
 
 
 def test_full_disk_calls_for_a_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    full = shutil.disk_usage(tmp_path)._replace(free=1 << 20)
-    monkeypatch.setattr(shutil, "disk_usage", lambda folder: full)
+    told = list(os.statvfs(tmp_path))
+    told[4] = (1 << 20) // told[1]  # free blocks that the user may fill, bytes a block
+    monkeypatch.setattr(os, "statvfs", lambda folder: os.statvfs_result(told))
     monkeypatch.delenv(kernel_cache.VARIABLE, raising=False)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "mine"))
-    monkeypatch.setattr(kernel_cache.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
     assert str(kernel_cache.choose_folder()).startswith(str(tmp_path / "temporary"))
 
 
@@ -122,7 +124,7 @@ def test_temporary_folder_that_is_not_the_users_alone_is_left_alone(tmp_path: Pa
     monkeypatch.delenv(kernel_cache.VARIABLE, raising=False)
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    monkeypatch.setattr(kernel_cache.tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     planted = tmp_path / f"clrt-{os.getuid()}"
     planted.mkdir()
     planted.chmod(0o777)

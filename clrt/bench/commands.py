@@ -58,11 +58,15 @@ def picture_of(name: str, folder: Path) -> Path:
 
 
 def environment(home: Path) -> dict[str, str]:
-    """As of this process, with a home and caches of its own: what PoCL, clrt and others keep between runs goes there."""
+    """As of this process, with a home and caches of its own: what PoCL, clrt and others keep between runs goes there.
+
+    Compiled modules of Python belong to what is installed: each program may keep its own beside its source, if it does not have them.
+    """
     own = {"HOME": home, "XDG_CACHE_HOME": home / "cache", "XDG_CONFIG_HOME": home / "config", "POCL_CACHE_DIR": home / "pocl"}
     for folder in own.values():
         folder.mkdir(parents=True, exist_ok=True)
-    return {**os.environ, **{name: str(folder) for name, folder in own.items()}}
+    given = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return {**given, **{name: str(folder) for name, folder in own.items()}}
 
 
 def programs(folder: Path, size: int) -> tuple[list[Program], list[Missing]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -21,6 +20,8 @@ _MESHES = {".obj", ".ply", ".stl", ".off"}  #: not scenes by themselves, as .glt
 def check_scene(path: Path) -> None:
     """Raise ClrtError where `path` is no scene text: a command misspelt, no file, a mesh."""
     if not path.exists() and path.parent == Path() and not path.suffix:
+        import difflib  # for faults alone
+
         near = difflib.get_close_matches(str(path), _COMMANDS, 1, 0.7)
         if near:
             raise ClrtError(f"no command and no file is called {path}; did you mean `clrt {near[0]}`?")
@@ -40,6 +41,8 @@ def check_input(path: Path) -> None:
     if not path.parent.is_dir():
         raise ClrtError(f"{path}: no such file; there is no folder {path.parent}")
     files = [entry.name for entry in path.parent.iterdir() if entry.is_file()]
+    import difflib  # for faults alone
+
     near = difflib.get_close_matches(path.name, files, 1, 0.5)
     raise ClrtError(f"{path}: no such file" + (f"; did you mean {path.parent / near[0]}?" if near else ""))
 

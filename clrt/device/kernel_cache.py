@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 import stat
-import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -104,13 +102,19 @@ def unwritable_folder() -> str | None:
 
 def _temporary_home() -> Path:
     """The user's own folder for temporary caches: libraries are loaded from it, so it is never one that somebody else made."""
-    shared = Path(tempfile.gettempdir()) / f"clrt-{os.getuid()}"
+    shared = Path(_temporary()) / f"clrt-{os.getuid()}"
     with suppress(OSError):
         shared.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = shared.lstat()
         if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022:
             return shared
     return Path(temporary_folder())
+
+
+def _temporary() -> str:
+    import tempfile  # slow to import, and seldom needed
+
+    return tempfile.gettempdir()
 
 
 def _writable(folder: Path) -> bool:
@@ -123,10 +127,13 @@ def _writable(folder: Path) -> bool:
 
 def _roomy(folder: Path) -> bool:
     """Whether the disk has room for what is kept, and the user may fill it: a quota shows only as one writes."""
+    trial = folder / f".clrt-{os.urandom(6).hex()}.part"
     try:
-        if shutil.disk_usage(folder).free < _ROOM:
+        disk = os.statvfs(folder)
+        if disk.f_bavail * disk.f_frsize < _ROOM:
             return False
-        with tempfile.TemporaryFile(dir=folder) as file:
+        with open(trial, "xb") as file:
+            trial.unlink()
             file.write(bytes(1 << 16))
     except OSError:
         return False
@@ -141,6 +148,8 @@ def clear() -> None:
             if not _POCLS.fullmatch(entry.name) or entry.is_symlink():
                 continue
             if entry.is_dir():
+                import shutil  # slow to import, and seldom needed
+
                 shutil.rmtree(entry, ignore_errors=True)
             else:
                 with suppress(OSError):
@@ -164,13 +173,13 @@ def clear_if_one_died() -> bool:
 
 def compiled_note(name: str) -> Path:
     """The file that notes that the program of this name is compiled, kernels and all; it goes when the cache is emptied."""
-    return Path(os.environ.get(VARIABLE, tempfile.gettempdir())) / f"{_COMPILED}{name}"
+    return Path(os.environ.get(VARIABLE) or _temporary()) / f"{_COMPILED}{name}"
 
 
 def suspect() -> None:
     """An entry is broken: the folder is emptied as if a process had died, once no other process is loading from it."""
     with suppress(OSError):
-        Path(os.environ.get(VARIABLE, tempfile.gettempdir()), f"{_MARK}0").touch()
+        Path(os.environ.get(VARIABLE) or _temporary(), f"{_MARK}0").touch()
 
 
 def _alive(process: str) -> bool:
@@ -185,7 +194,7 @@ def loading() -> Iterator[None]:
         if not _loading:
             clear_if_one_died()
         _loading += 1
-        mark = Path(os.environ.get(VARIABLE, tempfile.gettempdir())) / f"{_MARK}{os.getpid()}"
+        mark = Path(os.environ.get(VARIABLE) or _temporary()) / f"{_MARK}{os.getpid()}"
         note_unfinished(str(mark))
         with suppress(OSError):
             mark.touch()

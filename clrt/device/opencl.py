@@ -1,7 +1,7 @@
 """OpenCL by pyopencl: the whole package where it is imported, else its extension module alone.
 
-The package imports a hundred modules that a picture has no use for, for a tenth of a second. What it calls is in the extension; of the little
-that it puts around that, here is what pictures need, with the same names and arguments. Objects made one way work the other.
+The package imports a hundred modules that a picture has no use for, for a tenth of a second. What it calls is in the extension; of the
+little that it puts around that, here is what pictures need, with the same names and arguments. Objects made one way work the other.
 """
 
 from __future__ import annotations

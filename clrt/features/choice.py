@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 from clrt.errors import ClrtError
@@ -23,6 +22,8 @@ def _effect_name(given: str) -> str:
     plain = " ".join(given.casefold().replace("-", " ").replace("_", " ").split())
     if plain in EFFECTS:
         return plain
+    import difflib  # for faults alone
+
     near = difflib.get_close_matches(plain, EFFECTS, 1, 0.5)
     hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(EFFECTS)}"
     raise ClrtError(f"no effect is called '{given}'; {hint}")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -36,6 +34,9 @@ def write(file: BinaryIO, pixels: NDArray[np.float32], comment: str = "") -> Non
     if comment:
         spec.attribute("ImageDescription", comment)
     # The library writes to files of a name alone.
+    import shutil
+    import tempfile
+
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.exr")
         out = oiio.ImageOutput.create(str(path))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
@@ -29,6 +28,8 @@ def did_you_mean(token: str, valid: Iterable[str]) -> str:
 
 def nearest(token: str, valid: Iterable[str]) -> str:
     """The valid word that was probably meant; nothing where none is near."""
+    import difflib  # for faults alone
+
     near = difflib.get_close_matches(token.lower(), list(valid), n=1) if len(token) <= LONGEST_SHOWN else []
     return near[0] if near else ""
 

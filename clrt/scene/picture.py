@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import struct
 import warnings
 import zlib
@@ -65,6 +64,8 @@ class Use:
 def _nearby(path: Path) -> str:
     if not path.parent.is_dir():
         return ""
+    import difflib  # for faults alone
+
     near = difflib.get_close_matches(path.name, [entry.name for entry in path.parent.iterdir()], n=1)
     return f'; did you mean "{near[0]}"?' if near else ""
 

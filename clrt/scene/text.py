@@ -6,7 +6,6 @@ and whatever is wrong, which it reports. What lines mean together is `clrt.scene
 
 from __future__ import annotations
 
-import difflib
 import stat
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -27,6 +26,9 @@ from clrt.scene.words import WORDS, WordCall, read_word
 
 if TYPE_CHECKING:
     from clrt.scene.saved import SavedTexts
+
+
+_MARK = b"\xef\xbb\xbf"  #: of byte order, which some editors put before UTF-8
 
 
 @dataclass(eq=False)
@@ -90,6 +92,8 @@ def _nearby(path: Path) -> str:
         names = [entry.name for entry in path.parent.iterdir()]
     except OSError:
         return ""
+    import difflib  # for faults alone
+
     near = difflib.get_close_matches(path.name, names, n=1)
     return f'; did you mean "{path.parent / near[0]}"?' if near else ""
 
@@ -101,7 +105,7 @@ def decode(data: bytes, source: str) -> str:
     end = data.find(b"\0")
     if end < 0:
         try:
-            return data.decode("utf-8-sig")
+            return data.removeprefix(_MARK).decode()
         except UnicodeDecodeError as problem:
             end = problem.start
     before = data[:end].decode("utf-8", "replace")
