@@ -14,6 +14,7 @@ HOT void group_lights(const Geometry *geometry, global const Light *lights, int 
         for (int p = 0; p < GROUP; p++) {
             const Hit *hit = hits + p;
             real_n to_light[3];
+            #pragma unroll
             for (int a = 0; a < 3; a++) to_light[a] = light->position[a] - hit->point[a];
             mask_n above = is_greater(dot_n(hit->geometric, to_light), (real_n)0);
             //@ light_above

@@ -40,11 +40,13 @@ typedef struct {
 
 HOT void normalize_n(real_n *a) {
     const real_n scale = R(1.0) / sqrt(dot_n(a, a));
+    #pragma unroll
     for (int i = 0; i < 3; i++) a[i] *= scale;
 }
 
 // Turns `a` to the side of `b`.
 HOT void face_towards(real_n *a, const real_n *b, const int away) {
     const mask_n flip = away ? is_greater(dot_n(a, b), (real_n)0) : is_less(dot_n(a, b), (real_n)0);
+    #pragma unroll
     for (int i = 0; i < 3; i++) a[i] = choose(flip, -a[i], a[i]);
 }

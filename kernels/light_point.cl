@@ -12,6 +12,7 @@ HOT void direct_light(const Geometry *geometry, global const Light *lights, int 
     for (int i = 0; i < light_count; i++) {
         global const Light *light = lights + i;
         real_n to_light[3];
+        #pragma unroll
         for (int a = 0; a < 3; a++) to_light[a] = light->position[a] - hit->point[a];
         normalize_n(to_light);
         const real_n cos_light = dot_n(hit->normal, to_light), cos_view = dot_n(hit->normal, rays->direction);
@@ -32,6 +33,7 @@ HOT void direct_light(const Geometry *geometry, global const Light *lights, int 
         //@ visible
         amount = choose(lit, amount, (real_n)0);
         //@ light_lit
+        #pragma unroll
         for (int a = 0; a < 3; a++) shade->sum[a] += amount * light->color[a];
     }
 }

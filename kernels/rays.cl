@@ -32,6 +32,7 @@ HOT void rays_prepare(Rays *rays, real corner_extent) {
     //@ rays_begin
     rays->octant = NO_LANES;
     rays->scale = abs_n(rays->origin[0]) + abs_n(rays->origin[1]) + abs_n(rays->origin[2]) + (real_n)corner_extent;
+    #pragma unroll
     for (int a = 0; a < 3; a++) {
         const real_n d = rays->direction[a];
         const mask_n negative = is_less(d, (real_n)0);

@@ -10,6 +10,7 @@ HOT mask_n reach_rays(const Geometry *geometry, const Rays *rays, const Hit *hit
     real_n start[3] = {hit->point[0], hit->point[1], hit->point[2]}, error = hit->error;
     mask_n own = load_lanes(hit->slot);
     //@ reach_start
+    #pragma unroll
     for (int a = 0; a < 3; a++) {
         towards.origin[a] = choose(lit, multiply_add(hit->geometric[a], error, start[a]), (real_n)0);
         towards.direction[a] = to_light[a];
@@ -17,8 +18,10 @@ HOT mask_n reach_rays(const Geometry *geometry, const Rays *rays, const Hit *hit
     real_n t_max = (real_n)INFINITY;
     if (ends) {
         // From where the ray does start: its end is `end`, not a point beside it.
+        #pragma unroll
         for (int a = 0; a < 3; a++) towards.direction[a] = choose(lit, end[a] - towards.origin[a], (real_n)1);
         const real_n length = sqrt(dot_n(towards.direction, towards.direction));
+        #pragma unroll
         for (int a = 0; a < 3; a++) towards.direction[a] /= length;
         t_max = length * (R(1.0) - R(16.0) * UNIT_ROUNDOFF) - short_by;
         lit &= is_greater(t_max, (real_n)0);

@@ -22,6 +22,35 @@ HOT Geometry scene_geometry(global const Frame *frame, global const int2 *nodes,
     return geometry;
 }
 
+#if REAL_BITS == 64
+#define film_row(numbers, y) convert_float4(vload4(y, numbers))
+#else
+#define film_row(numbers, y) vload4(y, numbers)
+#endif
+
+// A packet's colours into the picture, rows of pixels [row, end_row).
+HOT void film_store(real out[3][LANES], int column, int row, int width, int end_row, global float *film) {
+#if PACKET_WIDTH == 4
+    // Inside it, four pixels at once: loads and stores of single numbers would take as long as the rest of the shading.
+    if (column + PACKET_WIDTH <= width && row + PACKET_HEIGHT <= end_row) {
+        #pragma unroll
+        for (int y = 0; y < PACKET_HEIGHT; y++) {
+            const float4 r = film_row(out[0], y), g = film_row(out[1], y), b = film_row(out[2], y);
+            global float *pixels = film + 3 * ((size_t)(row + y) * width + column);
+            vstore4((float4)(r.x, g.x, b.x, r.y), 0, pixels);
+            vstore4((float4)(g.y, b.y, r.z, g.z), 1, pixels);
+            vstore4((float4)(b.z, r.w, g.w, b.w), 2, pixels);
+        }
+        return;
+    }
+#endif
+    for (int k = 0; k < LANES; k++) {
+        const int x = column + k % PACKET_WIDTH, y = row + k / PACKET_WIDTH;
+        if (x >= width || y >= end_row) continue;
+        for (int a = 0; a < 3; a++) film[3 * ((size_t)y * width + x) + a] = (float)out[a][k];
+    }
+}
+
 // One packet, apart from the kernel: PoCL makes three copies of a kernel's body, and one of this.
 static __attribute__((noinline)) void
 render_packet(const int column, const int row, global const Frame *frame, global const int2 *nodes, global const int *indices,
@@ -55,6 +84,7 @@ render_packet(const int column, const int row, global const Frame *frame, global
         #pragma unroll
         for (int a = 0; a < 3; a++) shade.sum[a] = ambient;
         //@ light
+        #pragma unroll
         for (int a = 0; a < 3; a++) {
             real_n albedo;
             gather_same(hit.one_material, albedo, materials[hit.material[k]].color[a]);
@@ -66,14 +96,10 @@ render_packet(const int column, const int row, global const Frame *frame, global
         //@ spawn
         //@ next
     }
-    // Out to the picture, pixel by pixel.
     real out[3][LANES];
+    #pragma unroll
     for (int a = 0; a < 3; a++) store_lanes(color[a], out[a]);
-    for (int k = 0; k < LANES; k++) {
-        const int x = column + k % PACKET_WIDTH, y = row + k / PACKET_WIDTH;
-        if (x >= frame->width || y >= end_row) continue;
-        //@ store
-    }
+    //@ film
     //@ end
 }
 

@@ -67,7 +67,10 @@ static inline double sampling_add(uint sample, global double *sum, real value) {
 //@hook camera
     sampling_camera(frame, column, row, sample, seed, &rays);
 //@end
-//@hook store
+//@hook film
+    for (int k = 0; k < LANES; k++) {
+        const int x = column + k % PACKET_WIDTH, y = row + k / PACKET_WIDTH;
+        if (x >= frame->width || y >= end_row) continue;
         const size_t at = (size_t)y * frame->width + x, in_tile = tile_at + y % TILE_HEIGHT * TILE_WIDTH + x % TILE_WIDTH;
         for (int a = 0; a < 3; a++) {
             if (sample_range[2] > 0) {
@@ -76,4 +79,5 @@ static inline double sampling_add(uint sample, global double *sum, real value) {
                 film[3 * at + a] = (float)(sampling_add(sample, sample_sums + 3 * at + a, out[a][k]) / (sample + 1));
             }
         }
+    }
 //@end

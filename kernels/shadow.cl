@@ -5,6 +5,7 @@
 HOT Geometry light_geometry(const Geometry *geometry, global const Light *light, int index) {
     Geometry seen = *geometry;
     seen.planes = geometry->light_planes + (size_t)index * geometry->slot_count;
+    #pragma unroll
     for (int a = 0; a < 3; a++) seen.shared_origin[a] = light->given[a];
     //@ light_geometry
     return seen;
@@ -15,6 +16,7 @@ HOT Geometry light_geometry(const Geometry *geometry, global const Light *light,
 HOT void shadow_rays(const Geometry *geometry, global const Light *light, const Hit *hit, mask_n lit, Rays *to_hits, Hits *none) {
     Rays rays;
     real_n end[3], span[3], offset = 0;
+    #pragma unroll
     for (int a = 0; a < 3; a++) {
         end[a] = hit->point[a];
         //@ shadow_end
@@ -24,11 +26,13 @@ HOT void shadow_rays(const Geometry *geometry, global const Light *light, const 
     offset *= R(8.0) * UNIT_ROUNDOFF;
     real_n above = hit->error + offset;
     //@ shadow_above
+    #pragma unroll
     for (int a = 0; a < 3; a++) {
         rays.origin[a] = (real_n)light->position[a];
         span[a] = multiply_add(hit->geometric[a], above, end[a]) - light->position[a];
     }
     const real_n length = sqrt(dot_n(span, span));
+    #pragma unroll
     for (int a = 0; a < 3; a++) rays.direction[a] = span[a] / length;
     rays.t_min = offset;
     rays.t_max = length;

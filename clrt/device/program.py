@@ -61,7 +61,7 @@ _DEFAULTS = {"trace": "        //@ eye_trace", "next": "        break;",
                   //@ arguments
                   //@ packet_arguments
     );""",
-             "store": "        for (int a = 0; a < 3; a++) film[3 * ((size_t)y * frame->width + x) + a] = (float)out[a][k];"}  # fmt: skip
+             "film": "    film_store(out, column, row, frame->width, end_row, film);"}  # fmt: skip
 _PLACE = re.compile(r"^[ \t]*//@ (\w+)[ \t]*$", re.M)
 _HOOK = re.compile(r"^//@hook (\w+)\n(.*?)^//@end[ \t]*\n?", re.M | re.S)
 _KERNEL = re.compile(r"^kernel\b[^{;]*?\bvoid (\w+)\(", re.M)
