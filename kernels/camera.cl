@@ -1,7 +1,7 @@
 // Provides: camera_rays: the primary rays of one packet of pixels.
 // Needs: lanes.cl, rays.cl, structs.  Reads: PACKET_WIDTH, PACKET_HEIGHT (their product is LANES).
 
-// Rays through the centres of the pixels from (column, row) on; pixels outside the picture are inactive.
+// Rays through the centres of the pixels from (column, row) on; pixels outside the picture are inactive. Not inverted (rays.cl).
 HOT void camera_rays(global const Frame *frame, int column, int row, Rays *rays) {
     real x[LANES], y[LANES];
     for (int k = 0; k < LANES; k++) {
@@ -22,5 +22,5 @@ HOT void camera_rays(global const Frame *frame, int column, int row, Rays *rays)
     rays->t_min = (real_n)0;
     rays->t_max = (real_n)INFINITY;
     rays->skip = (mask_n)-1;
-    rays_prepare(rays, R(0.0));
+    rays_check(rays, R(0.0));
 }

@@ -144,10 +144,12 @@ HOT void group_begin(Group *group, const Rays *rays, Hits *hits, int count) {
 
 // A packet that goes alone: one copy for all callers.
 static __attribute__((noinline)) void packet_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
-    scene_trace(geometry, rays, SHARED_ORIGIN, any_hit, hits);
+    Rays alone = *rays;
+    rays_invert(&alone);
+    scene_trace(geometry, &alone, SHARED_ORIGIN, any_hit, hits);
 }
 
-// Rays as scene_trace takes them, with one origin for all that are active. Apart from the callers: they are few, and this is large.
+// Rays as scene_trace takes them, but for what rays_invert fills, with one origin for all that are active. Apart from the callers: they are few, and this is large.
 static __attribute__((noinline)) void group_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
     Spread of[GROUP];
     for (int p = 0; p < GROUP; p++) least_directions(rays + p, rays[p].active, of[p].lo, of[p].minus_hi);

@@ -1,4 +1,4 @@
-// Provides: Rays, Hits; SHARED_NOTHING, SHARED_ORIGIN, SHARED_DIRECTION; rays_prepare, rays_along.
+// Provides: Rays, Hits; SHARED_NOTHING, SHARED_ORIGIN, SHARED_DIRECTION; rays_check, rays_invert, rays_prepare, ray_point.
 // Needs: lanes.cl.  Reads: nothing.
 
 // What the rays of a packet share, and others that go with it: their origin is geometry->shared_origin.
@@ -26,12 +26,19 @@ typedef struct {
     //@ hits_members
 } Hits;
 
-// Fills what follows from origin and direction; lanes with a NaN or an infinity become inactive: they hit nothing.
+// Fills `scale`; lanes with a NaN or an infinity become inactive: they hit nothing.
 // `corner_extent` bounds the coordinates of the corners that distances are computed from in `real`; 0 for rays of a shared origin.
-HOT void rays_prepare(Rays *rays, real corner_extent) {
+HOT void rays_check(Rays *rays, real corner_extent) {
     //@ rays_begin
-    rays->octant = NO_LANES;
     rays->scale = abs_n(rays->origin[0]) + abs_n(rays->origin[1]) + abs_n(rays->origin[2]) + (real_n)corner_extent;
+    #pragma unroll
+    for (int a = 0; a < 3; a++)
+        rays->active &= is_at_most(abs_n(rays->direction[a]), (real_n)REAL_MAX) & is_at_most(abs_n(rays->origin[a]), (real_n)REAL_MAX);
+}
+
+// Fills `inverse` and `octant`, which kd-trees ask for; packets that go together do without.
+HOT void rays_invert(Rays *rays) {
+    rays->octant = NO_LANES;
     #pragma unroll
     for (int a = 0; a < 3; a++) {
         const real_n d = rays->direction[a];
@@ -39,8 +46,13 @@ HOT void rays_prepare(Rays *rays, real corner_extent) {
         const mask_n tiny = is_less(abs_n(d), (real_n)TINY_COMPONENT);
         rays->inverse[a] = choose(tiny, choose(negative, (real_n)-HUGE_INVERSE, (real_n)HUGE_INVERSE), R(1.0) / d);
         rays->octant |= negative & (mask_n)(1 << a);
-        rays->active &= is_at_most(abs_n(d), (real_n)REAL_MAX) & is_at_most(abs_n(rays->origin[a]), (real_n)REAL_MAX);
     }
+}
+
+// All that follows from origin and direction.
+HOT void rays_prepare(Rays *rays, real corner_extent) {
+    rays_check(rays, corner_extent);
+    rays_invert(rays);
 }
 
 HOT real_n ray_point(const Rays *rays, real_n t, int axis) { return multiply_add(rays->direction[axis], t, rays->origin[axis]); }

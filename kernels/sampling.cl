@@ -7,7 +7,7 @@
 // Sums are taken in float64, sample after sample, so they do not depend on how the picture is cut into launches; after n additions the
 // relative error is below n 2^-53.
 
-// The rays of camera_rays, moved from the pixel's centre and the eye by what effects add. `extent` is as in rays_prepare.
+// The rays of camera_rays, moved from the pixel's centre and the eye by what effects add. `extent` is as in rays_check.
 HOT void sampling_camera(global const Frame *frame, int column, int row, uint sample, uint seed, Rays *rays) {
     real x[LANES], y[LANES];
     uint pixel[LANES];
@@ -33,7 +33,8 @@ HOT void sampling_camera(global const Frame *frame, int column, int row, uint sa
     rays->t_min = (real_n)0;
     rays->t_max = (real_n)INFINITY;
     rays->skip = (mask_n)-1;
-    rays_prepare(rays, extent);
+    rays_check(rays, extent);
+    //@ sample_ready
 }
 
 // Sample 0 begins the sum.

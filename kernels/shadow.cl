@@ -12,7 +12,7 @@ HOT Geometry light_geometry(const Geometry *geometry, global const Light *light,
 }
 
 // Traced from the light, whose rays share it as their origin, to the point: it ends off the surface by the point's error and the
-// ray's own (4u of its length and of the light's position), starts as far from the light, and passes by the primitive it ends on.
+// ray's own (4u of its length and of the light's position), starts as far from the light, and passes by the primitive it ends on. Not inverted.
 HOT void shadow_rays(const Geometry *geometry, global const Light *light, const Hit *hit, mask_n lit, Rays *to_hits, Hits *none) {
     Rays rays;
     real_n end[3], span[3], offset = 0;
@@ -39,7 +39,7 @@ HOT void shadow_rays(const Geometry *geometry, global const Light *light, const 
     rays.active = lit;
     rays.skip = load_lanes(hit->slot);
     //@ shadow_skip
-    rays_prepare(&rays, R(0.0));
+    rays_check(&rays, R(0.0));
     Hits hits;
     hits.t = length;
     hits.slot = (mask_n)-1;

@@ -4,9 +4,15 @@
 //@hook sample_origin
     if (HAVE_WIDE_EYE) extent = frame->extent;
 //@end
+//@hook sample_ready
+    if (HAVE_WIDE_EYE) rays_invert(rays);
+//@end
 //@hook trace_default
-        if (HAVE_WIDE_EYE) scene_trace(&geometry, &rays, SHARED_NOTHING, 0, &hits);
-        else scene_trace(&geometry, &rays, SHARED_ORIGIN, 0, &hits);
+        if (HAVE_WIDE_EYE) {
+            scene_trace(&geometry, &rays, SHARED_NOTHING, 0, &hits);
+        } else {
+            //@ eye_trace
+        }
 //@end
 //@hook bounce_begin
     if (HAVE_WIDE_EYE) current.from_eye = 0;
