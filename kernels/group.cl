@@ -18,7 +18,6 @@ render_group(const int group_column, const int group_row, global const Frame *fr
     //@ begin
     Rays eye_rays[GROUP];
     Hits eye_hits[GROUP];
-    Hit eye_hit[GROUP];
     for (int p = 0; p < GROUP; p++) {
         const int column = group_column + GROUP_X(p) * PACKET_WIDTH, row = group_row + GROUP_Y(p) * PACKET_HEIGHT;
         Rays rays;
@@ -31,7 +30,6 @@ render_group(const int group_column, const int group_row, global const Frame *fr
         eye_hits[p] = hits;
     }
     group_trace(&geometry, eye_rays, 0, eye_hits);
-    for (int p = 0; p < GROUP; p++) hit_surface(&geometry, frame, surfaces, eye_rays + p, eye_hits + p, eye_hit + p);
     //@ group_seen
     for (int p = 0; p < GROUP; p++) {
         const int column = group_column + GROUP_X(p) * PACKET_WIDTH, row = group_row + GROUP_Y(p) * PACKET_HEIGHT;
@@ -39,7 +37,7 @@ render_group(const int group_column, const int group_row, global const Frame *fr
         render_packet(column, row, frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces, materials, end_row, film
                       //@ arguments
                       //@ packet_arguments
-                      , eye_rays + p, eye_hits + p, eye_hit + p
+                      , eye_rays + p, eye_hits + p
                       //@ seen_arguments
         );
     }
@@ -47,21 +45,14 @@ render_group(const int group_column, const int group_row, global const Frame *fr
 
 //@end
 //@hook group_parameters
-                   , const Rays *eye_rays, const Hits *eye_hits, const Hit *eye_hit
+                   , const Rays *eye_rays, const Hits *eye_hits
                    //@ seen_parameters
 //@end
 //@hook eye_rays
     rays = *eye_rays;
-    int from_group = 1;  // whether what the group has found is this round's
 //@end
 //@hook eye_trace
         hits = *eye_hits;
-//@end
-//@hook surface
-        if (from_group) hit = *eye_hit;
-        else hit_surface(&geometry, frame, surfaces, &rays, &hits, &hit);
-        //@ surface_seen
-        from_group = 0;
 //@end
 //@hook launch
     render_group(column, row, frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces, materials, end_row, film

@@ -248,8 +248,10 @@ def _files(features: Features, precision: Precision, lanes: int, shape: Shape, e
     yield from ("group_trace.cl",) if together else ()
     yield from (f.kernel for f in features.active if not f.early)
     yield from ("group.cl",) if together else ()
-    yield from ("group_shadow.cl",) if together and lights_grouped(features, lanes, shape) else ()
-    yield from ("group_sun.cl",) if together and suns_grouped(features, lanes, shape) else ()
+    lights, suns = (together and grouped(features, lanes, shape) for grouped in (lights_grouped, suns_grouped))
+    yield from ("group_surface.cl",) if lights or suns else ()
+    yield from ("group_shadow.cl",) if lights else ()
+    yield from ("group_sun.cl",) if suns else ()
     yield from after
 
 
