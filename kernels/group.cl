@@ -16,6 +16,7 @@ render_group(const int group_column, const int group_row, global const Frame *fr
 ) {
     Geometry geometry = scene_geometry(frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces);
     //@ begin
+    //@ film_ahead
     Rays eye_rays[GROUP];
     Hits eye_hits[GROUP];
     for (int p = 0; p < GROUP; p++) {

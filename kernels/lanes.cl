@@ -1,4 +1,4 @@
-// Provides: real, real_n, mask_n, double_n (LANES rays side by side), R(), choose, min_n, max_n, abs_n, any_lane, fetch_ahead, comparisons, dot_n, lane access.
+// Provides: real, real_n, mask_n, double_n (LANES rays side by side), R(), choose, min_n, max_n, abs_n, any_lane, fetch_ahead, fetch_to_write, comparisons, dot_n, lane access.
 // Needs: nothing.  Reads: LANES (16, 8, 4 or 1), REAL_BITS (32 or 64).
 //
 // Out-of-line vector built-ins (select, any, fmin...) go through memory on PoCL; everything here compiles to plain vector instructions.
@@ -68,11 +68,13 @@ HOT real_n min_n(real_n a, real_n b) { return choose(is_less(a, b), a, b); }
 HOT real_n max_n(real_n a, real_n b) { return choose(is_greater(a, b), a, b); }
 HOT real_n abs_n(real_n a) { return as_real_n(as_mask_n(a) & WITHOUT_SIGN); }
 
-// Asks for what is read soon; nothing where the compiler has no word for it.
+// Asks for what is read, or written, soon; nothing where the compiler has no word for it.
 #if defined(__clang__) && (defined(__x86_64__) || defined(__aarch64__))
 #define fetch_ahead(p) __builtin_prefetch((const void *)(uintptr_t)(p))
+#define fetch_to_write(p) __builtin_prefetch((const void *)(uintptr_t)(p), 1)
 #else
 #define fetch_ahead(p)
+#define fetch_to_write(p)
 #endif
 
 // One mask test where the instruction set has it, a halving reduction elsewhere.

@@ -51,6 +51,14 @@ HOT void film_store(real out[3][LANES], int column, int row, int width, int end_
     }
 }
 
+// Asks for the pixels of a work-item, on the cores that will write them: what a store waits for else is most of its time.
+HOT void film_ahead(int column, int row, int width, int end_row, global const float *film) {
+    for (int y = row; y < min(row + ITEM_HEIGHT, end_row); y++) {
+        global const float *pixels = film + 3 * ((size_t)y * width + column);
+        for (int i = 0; i < 3 * ITEM_WIDTH; i += 16) fetch_to_write(pixels + i);
+    }
+}
+
 // One packet, apart from the kernel: PoCL makes three copies of a kernel's body, and one of this.
 static __attribute__((noinline)) void
 render_packet(const int column, const int row, global const Frame *frame, global const int2 *nodes, global const int *indices,

@@ -68,6 +68,9 @@ static inline double sampling_add(uint sample, global double *sum, real value) {
 //@hook camera
     sampling_camera(frame, column, row, sample, seed, &rays);
 //@end
+//@hook film_ahead
+    // What is added to is read, and waited for, in any case.
+//@end
 //@hook film
     for (int k = 0; k < LANES; k++) {
         const int x = column + k % PACKET_WIDTH, y = row + k / PACKET_WIDTH;

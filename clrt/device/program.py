@@ -60,6 +60,7 @@ _DEFAULTS = {"trace": "        //@ eye_trace", "eye_trace": "        rays_invert
                   //@ arguments
                   //@ packet_arguments
     );""",
+             "film_ahead": "    film_ahead(group_column, group_row, frame->width, end_row, film);",
              "film": "    film_store(out, column, row, frame->width, end_row, film);"}  # fmt: skip
 _PLACE = re.compile(r"^[ \t]*//@ (\w+)[ \t]*$", re.M)
 _HOOK = re.compile(r"^//@hook (\w+)\n(.*?)^//@end[ \t]*\n?", re.M | re.S)
