@@ -34,20 +34,30 @@ HOT void packet_far(Group *group, int p) {
 // The triangles of a block that are left of the group's bounds in `picked`, packet by packet.
 HOT void group_test(const Geometry *geometry, Group *group, global const DirectionBoxes *boxes, uint picked, const int shared,
                     const int any_hit) {
-    int tested = 0;
+    int nearer = 0;
     for (int p = 0; p < group->count; p++) {
         uint met = picked & boxes_met(boxes, group->packet + p, group->packet_far[p]);
         if (!met) continue;
-        tested = 1;
-        Hits *hits = group->hits + p;
+        Hits hits = group->hits[p];
         const Rays *rays = group->rays + p;
         //@ count_met
         const real_n reach = shared == SHARED_ORIGIN ? (real_n)0 : rays_reach(rays, geometry->objects + geometry->surfaces[boxes->item[0]].object);
-        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared, group->active[p], hits);
-        if (any_hit) group->active[p] &= is_less(hits->slot, NO_LANES);
-        packet_far(group, p);
+        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared, group->active[p], &hits);
+        if (any_hit) {
+            // How far its rays go does not change with what they meet: a packet is done with, or not.
+            group->active[p] &= is_less(hits.slot, NO_LANES);
+            group->hits[p] = hits;
+            if (any_lane(group->active[p])) continue;
+            group->packet_far[p] = -1.0f;
+        } else {
+            const mask_n met_some = is_less(hits.t, group->hits[p].t);
+            group->hits[p] = hits;
+            if (!any_lane(met_some)) continue;
+            packet_far(group, p);
+        }
+        nearer = 1;
     }
-    if (tested) group_far(group);
+    if (nearer) group_far(group);
 }
 
 HOT void group_walk(const Geometry *geometry, Group *group, const int shared, const int any_hit) {
