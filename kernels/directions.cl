@@ -1,4 +1,4 @@
-// Provides: Directions, least_directions, directions_in_steps, boxes_met, first_bit; prepare_directions, prepare_unions: which triangles of a leaf rays
+// Provides: Directions, least_directions, directions_in_steps, boxes_met, boxes_near, first_bit; prepare_directions, prepare_unions: which triangles of a leaf rays
 //           of a shared origin can meet at all.
 // Needs: lanes.cl, rays.cl, triangle.cl, structs.  Reads: BOXES (16).
 //
@@ -73,13 +73,15 @@ HOT uint box_bits(short16 m) {
 #define PREPARE_DIRECTIONS 2
 #define PREPARE_UNIONS 3
 
-// A bit for each of 16 triangles or records whose box meets that of the directions, and which are not all farther away than `far`.
-HOT uint boxes_met(global const DirectionBoxes *boxes, const Directions *all, float far) {
+// A bit for each of 16 triangles or records whose box meets that of the directions.
+HOT uint boxes_met(global const DirectionBoxes *boxes, const Directions *all) {
     global const short16 *lo = (global const short16 *)boxes->lo, *hi = (global const short16 *)boxes->hi;
-    const uint near = near_bits(*(global const float16 *)boxes->near <= far);
-    return near & box_bits((lo[0] <= all->hi[0]) & (hi[0] >= all->lo[0]) & (lo[1] <= all->hi[1]) & (hi[1] >= all->lo[1])
-                           & (lo[2] <= all->hi[2]) & (hi[2] >= all->lo[2]));
+    return box_bits((lo[0] <= all->hi[0]) & (hi[0] >= all->lo[0]) & (lo[1] <= all->hi[1]) & (hi[1] >= all->lo[1])
+                    & (lo[2] <= all->hi[2]) & (hi[2] >= all->lo[2]));
 }
+
+// A bit for each that is not all farther away than `far`.
+HOT uint boxes_near(global const DirectionBoxes *boxes, float far) { return near_bits(*(global const float16 *)boxes->near <= far); }
 
 // Of numbers, none of them NaN: each is one instruction, which fmax, fmin and floor are not.
 static inline double larger(double a, double b) { return a > b ? a : b; }

@@ -16,48 +16,38 @@ typedef struct {
     int count;
     Directions all, packet[GROUP];
     mask_n active[GROUP];
-    float packet_far[GROUP], far;  // no lane of the packet, of the group needs more of its t
+    float far;  // no lane of the group needs more of its t
 } Group;
 
-HOT void group_far(Group *group) {
-    group->far = group->packet_far[0];
-    for (int p = 1; p < group->count; p++)
-        if (group->packet_far[p] > group->far) group->far = group->packet_far[p];
-}
-
 // Rounded up, as lanes may be wider than float; below 0 where no lane needs anything.
-HOT void packet_far(Group *group, int p) {
-    const real far = -least_lane(choose(group->active[p], -group->hits[p].t, (real_n)INFINITY));
-    group->packet_far[p] = far < 0 ? -1.0f : (float)(far + R(0x1p-22) * far);
+HOT void group_far(Group *group) {
+    real_n nearest = (real_n)INFINITY;  // of -t: one search across lanes serves all packets
+    for (int p = 0; p < group->count; p++) nearest = min_n(nearest, choose(group->active[p], -group->hits[p].t, (real_n)INFINITY));
+    const real far = -least_lane(nearest);
+    group->far = far < 0 ? -1.0f : (float)(far + R(0x1p-22) * far);
 }
 
-// The triangles of a block that are left of the group's bounds in `picked`, packet by packet.
-HOT void group_test(const Geometry *geometry, Group *group, global const DirectionBoxes *boxes, uint picked, const int shared,
+// The triangles of a block that are left of the group's bounds in `picked`, packet by packet; none is nearer than `near`.
+HOT void group_test(const Geometry *geometry, Group *group, global const DirectionBoxes *boxes, uint picked, float near, const int shared,
                     const int any_hit) {
-    int nearer = 0;
+    const real reached = (real)near - R(0x1p-22) * (real)near;
+    int changed = 0;
     for (int p = 0; p < group->count; p++) {
-        uint met = picked & boxes_met(boxes, group->packet + p, group->packet_far[p]);
-        if (!met) continue;
         Hits hits = group->hits[p];
+        const mask_n active = group->active[p];
+        if (!any_lane(active & is_at_least(hits.t, (real_n)reached))) continue;
+        uint met = picked & boxes_met(boxes, group->packet + p);
+        if (!met) continue;
         const Rays *rays = group->rays + p;
         //@ count_met
         const real_n reach = shared == SHARED_ORIGIN ? (real_n)0 : rays_reach(rays, geometry->objects + geometry->surfaces[boxes->item[0]].object);
-        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared, group->active[p], &hits);
-        if (any_hit) {
-            // How far its rays go does not change with what they meet: a packet is done with, or not.
-            group->active[p] &= is_less(hits.slot, NO_LANES);
-            group->hits[p] = hits;
-            if (any_lane(group->active[p])) continue;
-            group->packet_far[p] = -1.0f;
-        } else {
-            const mask_n met_some = is_less(hits.t, group->hits[p].t);
-            group->hits[p] = hits;
-            if (!any_lane(met_some)) continue;
-            packet_far(group, p);
-        }
-        nearer = 1;
+        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared, active, &hits);
+        group->hits[p] = hits;
+        if (any_hit) group->active[p] = active & is_less(hits.slot, NO_LANES);
+        // How far rays go does not change with what they meet where any hit will do.
+        changed |= !any_hit || !any_lane(group->active[p]);
     }
-    if (nearer) group_far(group);
+    if (changed) group_far(group);
 }
 
 HOT void group_walk(const Geometry *geometry, Group *group, const int shared, const int any_hit) {
@@ -65,6 +55,7 @@ HOT void group_walk(const Geometry *geometry, Group *group, const int shared, co
     float near[GROUP_STACK];
     int top = 1, block = 0;
     uint picked = 0;
+    float block_near = 0, next_near = 0;
     stack[0] = geometry->box_count - 1;
     near[0] = 0;
     while (top > 0 || block > 0) {
@@ -72,12 +63,13 @@ HOT void group_walk(const Geometry *geometry, Group *group, const int shared, co
         int next = 0;
         while (top > 0 && !next) {
             top--;
-            if (near[top] <= group->far) next = stack[top];
+            next_near = near[top];
+            if (next_near <= group->far) next = stack[top];
         }
         uint met = 0;
         if (next) {
             global const DirectionBoxes *boxes = geometry->boxes + next;
-            met = boxes_met(boxes, &group->all, group->far);
+            met = boxes_met(boxes, &group->all) & boxes_near(boxes, group->far);
             if (next <= geometry->block_count) {
                 for (uint rest = met; rest; rest &= rest - 1) fetch_test(geometry, boxes->item[first_bit(rest)], shared);
             } else {
@@ -98,8 +90,9 @@ HOT void group_walk(const Geometry *geometry, Group *group, const int shared, co
                 continue;
             }
         }
-        if (block > 0) group_test(geometry, group, geometry->boxes + block, picked, shared, any_hit);
+        if (block > 0) group_test(geometry, group, geometry->boxes + block, picked, block_near, shared, any_hit);
         block = met ? next : 0;
+        block_near = next_near;
         picked = met;
     }
 }
@@ -145,10 +138,7 @@ HOT void group_begin(Group *group, const Rays *rays, Hits *hits, int count) {
     group->rays = rays;
     group->hits = hits;
     group->count = count;
-    for (int p = 0; p < count; p++) {
-        group->active[p] = rays[p].active;
-        packet_far(group, p);
-    }
+    for (int p = 0; p < count; p++) group->active[p] = rays[p].active;
     group_far(group);
 }
 
