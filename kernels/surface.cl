@@ -19,7 +19,8 @@ HOT void hit_surface(const Geometry *geometry, global const Frame *frame, global
     #pragma unroll
     for (int k = 0; k < LANES; k++) record[k] = hit->slot[k] < frame->triangle_slots ? hit->slot[k] : 0;
     const int one_record = all_same(record);
-    if (one_record) store_lanes((mask_n)surfaces[record[0]].material, hit->material);
+    if (frame->only_material >= 0) store_lanes((mask_n)frame->only_material, hit->material);
+    else if (one_record) store_lanes((mask_n)surfaces[record[0]].material, hit->material);
     else
         #pragma unroll
         for (int k = 0; k < LANES; k++) hit->material[k] = surfaces[record[k]].material;

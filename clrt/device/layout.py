@@ -78,12 +78,12 @@ def material(real: type, extra: Sequence[Field]) -> np.dtype[np.void]:
 
 
 def frame(real: type, extra: Sequence[Field]) -> np.dtype[np.void]:
-    """What is one for the whole picture: camera, sizes, background; then the members of effects."""
+    """What is one for the whole picture: camera, sizes, background; the material of all triangles, or -1; then the members of effects."""
     vector: Any = (real, (3,))
     return struct_dtype([
         ("eye", np.float64, (3,)), ("local_origin", np.float64, (3,)), ("eye_local", *vector), ("corner", *vector), ("along_row", *vector),
         ("along_column", *vector), ("twist", *vector), ("background", *vector), ("extent", real), ("width", np.int32), ("height", np.int32),
-        ("object_count", np.int32), ("triangle_slots", np.int32), *extra,
+        ("object_count", np.int32), ("triangle_slots", np.int32), ("only_material", np.int32), *extra,
     ])  # fmt: skip
 
 

@@ -181,6 +181,13 @@ def _materials(scene: Scene, features: Features, precision: Precision) -> NDArra
     return records
 
 
+def _only_material(scene: Scene) -> int:
+    """The material that all triangles have; -1 where they have several, or there are none."""
+    ids = [item.material_ids for item in scene.objects if len(item)]
+    first = int(ids[0][0]) if ids else -1
+    return first if all(bool((of == first).all()) for of in ids) else -1
+
+
 def _frame(
     scene: Scene, origin: FloatArray, objects: NDArray[np.void], slots: int, features: Features, precision: Precision
 ) -> NDArray[np.void]:
@@ -191,7 +198,7 @@ def _frame(
         "eye": camera.eye, "local_origin": origin, "eye_local": camera.eye - origin, "corner": ul, "along_row": ur - ul,
         "along_column": ll - ul, "twist": ul - ur - ll + lr, "background": scene.background,
         "extent": objects["extent"].max(initial=0.0), "width": camera.width, "height": camera.height,
-        "object_count": len(objects), "triangle_slots": slots,
+        "object_count": len(objects), "triangle_slots": slots, "only_material": _only_material(scene),
     }  # fmt: skip
     values |= {name: value(scene) for f in features.active if not features.idle(f) for name, *_, value in f.frame}
     values |= {f.switch_name: not features.idle(f) for f in features.switches}
