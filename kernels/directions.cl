@@ -1,4 +1,4 @@
-// Provides: Directions, least_directions, directions_in_steps, boxes_met, boxes_near, first_bit; prepare_directions, prepare_unions: which triangles of a leaf rays
+// Provides: Directions, Spread, least_directions, directions_in_steps, boxes_met, boxes_near, first_bit; prepare_directions, prepare_unions: which triangles of a leaf rays
 //           of a shared origin can meet at all.
 // Needs: lanes.cl, rays.cl, triangle.cl, structs.  Reads: BOXES (16).
 //
@@ -16,14 +16,23 @@
 
 // Bounds of directions: of component a, all are between lo[a] and hi[a], in steps.
 typedef struct {
-    short lo[3], hi[3];
-} Directions;
+    short lo[4], hi[4];
+} __attribute__((aligned(16))) Directions;
 
-// Bounds of the directions of some lanes, the upper ones with the opposite sign: all are the least of something.
-HOT void least_directions(const Rays *rays, mask_n lanes, real *lo, real *minus_hi) {
+// Bounds of the directions of a packet, or of what stands for them: the least of each component, and of its negative; +INFINITY of no lanes.
+typedef struct {
+    real lo[4], minus_hi[4];
+} Spread;
+
+typedef PASTE(REAL_NAME, 4) real_4;
+typedef PASTE(REAL_NAME, 8) real_8;
+
+HOT void least_directions(const Rays *rays, Spread *of) {
+    of->lo[3] = of->minus_hi[3] = 0;
+    #pragma unroll
     for (int a = 0; a < 3; a++) {
-        lo[a] = least_lane(choose(lanes, rays->direction[a], (real_n)INFINITY));
-        minus_hi[a] = least_lane(choose(lanes, -rays->direction[a], (real_n)INFINITY));
+        of->lo[a] = least_lane(choose(rays->active, rays->direction[a], (real_n)INFINITY));
+        of->minus_hi[a] = least_lane(choose(rays->active, -rays->direction[a], (real_n)INFINITY));
     }
 }
 
@@ -38,13 +47,16 @@ HOT int direction_step(real direction, real middle, real steps) {
 }
 
 // In steps, one wider on both sides, and one more for what the conversion cuts off; of no lanes at all: bounds that meet no box.
-HOT void directions_in_steps(global const DirectionBoxes *boxes, const real *lo, const real *minus_hi, Directions *all) {
+HOT void directions_in_steps(global const DirectionBoxes *boxes, const Spread *of, Directions *all) {
     global const DirectionScale *scale = (global const DirectionScale *)boxes;
-    for (int a = 0; a < 3; a++) {
-        const int some = lo[a] < (real)INFINITY;
-        all->lo[a] = some ? (short)(direction_step(lo[a], scale->middle[a], scale->steps) - 2) : (short)SHRT_MAX;
-        all->hi[a] = some ? (short)(direction_step(-minus_hi[a], scale->middle[a], scale->steps) + 2) : (short)SHRT_MIN;
-    }
+    const real_8 bound = (real_8)(vload4(0, of->lo), -vload4(0, of->minus_hi));
+    const real_4 middle = (real_4)(scale->middle[0], scale->middle[1], scale->middle[2], 0);
+    real_8 step = (bound - (real_8)(middle, middle)) * (real_8)scale->steps;
+    step = step < (real_8)-32700 ? (real_8)-32700 : step;
+    step = step > (real_8)32700 ? (real_8)32700 : step;
+    const int8 wide = convert_int8(step) + (int8)(-2, -2, -2, -2, 2, 2, 2, 2);
+    const int8 none = (int8)(SHRT_MAX, SHRT_MAX, SHRT_MAX, SHRT_MAX, SHRT_MIN, SHRT_MIN, SHRT_MIN, SHRT_MIN);
+    *(short8 *)all->lo = convert_short8((int8)(-(of->lo[0] < (real)INFINITY)) ? wide : none);
 }
 
 #if defined(__AVX512BW__) && defined(__AVX512VL__) && defined(__AVX512DQ__) && defined(__clang__)

@@ -97,11 +97,6 @@ HOT void group_walk(const Geometry *geometry, Group *group, const int shared, co
     }
 }
 
-// Bounds of the directions of a packet, or of what stands for them: the least of each component, and of its negative; +INFINITY of no lanes.
-typedef struct {
-    real lo[3], minus_hi[3];
-} Spread;
-
 // How far apart they are along the first axes: all three of directions, those across a sun's.
 HOT real spread_size(const Spread *of, const int axes) {
     real size = 0;
@@ -152,7 +147,7 @@ static __attribute__((noinline)) void packet_trace(const Geometry *geometry, con
 // Rays as scene_trace takes them, but for what rays_invert fills, with one origin for all that are active. Apart from the callers: they are few, and this is large.
 static __attribute__((noinline)) void group_trace(const Geometry *geometry, const Rays *rays, const int any_hit, Hits *hits) {
     Spread of[GROUP];
-    for (int p = 0; p < GROUP; p++) least_directions(rays + p, rays[p].active, of[p].lo, of[p].minus_hi);
+    for (int p = 0; p < GROUP; p++) least_directions(rays + p, of + p);
     for (int begin = 0, count = 1; begin < GROUP; begin += count) {
         Group group;
         Spread all;
@@ -163,8 +158,8 @@ static __attribute__((noinline)) void group_trace(const Geometry *geometry, cons
             continue;
         }
         group_begin(&group, rays + begin, hits + begin, count);
-        for (int p = 0; p < count; p++) directions_in_steps(geometry->boxes, of[begin + p].lo, of[begin + p].minus_hi, group.packet + p);
-        directions_in_steps(geometry->boxes, all.lo, all.minus_hi, &group.all);
+        for (int p = 0; p < count; p++) directions_in_steps(geometry->boxes, of + begin + p, group.packet + p);
+        directions_in_steps(geometry->boxes, &all, &group.all);
         group_walk(geometry, &group, SHARED_ORIGIN, any_hit);
         for (int p = 0; p < count; p++) scene_rest(geometry, group.rays + p, group.active[p], SHARED_ORIGIN, any_hit, group.hits + p);
     }
