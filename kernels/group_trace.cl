@@ -32,12 +32,19 @@ HOT void group_test(const Geometry *geometry, Group *group, global const Directi
                     const int any_hit) {
     const real reached = (real)near - R(0x1p-22) * (real)near;
     int changed = 0;
-    for (int p = 0; p < group->count; p++) {
+    // All packets are compared before any is tested, without a branch between them.
+    uint each[GROUP], some = 0;
+    #pragma unroll
+    for (int p = 0; p < GROUP; p++) {
+        each[p] = picked & boxes_met(boxes, group->packet + p);
+        some |= (each[p] ? 1u : 0u) << p;
+    }
+    for (some &= (1u << group->count) - 1; some; some &= some - 1) {
+        const int p = first_bit(some);
+        uint met = each[p];
         Hits hits = group->hits[p];
         const mask_n active = group->active[p];
         if (!any_lane(active & is_at_least(hits.t, (real_n)reached))) continue;
-        uint met = picked & boxes_met(boxes, group->packet + p);
-        if (!met) continue;
         const Rays *rays = group->rays + p;
         //@ count_met
         const real_n reach = shared == SHARED_ORIGIN ? (real_n)0 : rays_reach(rays, geometry->objects + geometry->surfaces[boxes->item[0]].object);
