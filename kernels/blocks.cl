@@ -154,7 +154,7 @@ static __attribute__((noinline)) void block_unsure(const Geometry *geometry, glo
                                                    Hits *hits) {
     lane_int lane[LANES];
     for (int i = 0; i < LANES; i++) lane[i] = i == k ? -1 : 0;
-    for (; bits; bits &= bits - 1) triangle_test(geometry, rays, (real_n)reach, block->slot[lowest_bit(bits)], SHARED_NOTHING, load_lanes(lane), hits);
+    for (; bits; bits &= bits - 1) triangle_test(geometry, rays, (real_n)reach, block->slot[lowest_bit(bits)], SHARED_NOTHING, 0, load_lanes(lane), hits);
 }
 
 HOT void block_hits(const Geometry *geometry, global const Block *block, const Rays *rays, int k, real reach, Hits *hits) {

@@ -48,7 +48,7 @@ HOT void group_test(const Geometry *geometry, Group *group, global const Directi
         const Rays *rays = group->rays + p;
         //@ count_met
         const real_n reach = shared == SHARED_ORIGIN ? (real_n)0 : rays_reach(rays, geometry->objects + geometry->surfaces[boxes->item[0]].object);
-        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared, active, &hits);
+        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared, 1, active, &hits);
         group->hits[p] = hits;
         if (any_hit) group->active[p] = active & is_less(hits.slot, NO_LANES);
         // How far rays go does not change with what they meet where any hit will do.

@@ -71,7 +71,7 @@ HOT void kdtree_trace(const Geometry *geometry, global const Object *object, con
             // On large meshes what the tests wait for is memory: all records of the leaf are asked for at once.
             if (shared != SHARED_NOTHING)
                 for (int i = first; i < end; i++) fetch_test(geometry, geometry->indices[i], shared);
-            for (int i = first; i < end; i++) triangle_test(geometry, rays, reach, geometry->indices[i], shared, live, hits);
+            for (int i = first; i < end; i++) triangle_test(geometry, rays, reach, geometry->indices[i], shared, 0, live, hits);
             if (any_hit) {
                 lanes &= is_less(hits->slot, NO_LANES);
                 if (!any_lane(lanes)) break;

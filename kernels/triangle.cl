@@ -9,6 +9,9 @@
 // reach >= |o - v0| + |e| and m = max(|e1|, |e2|), each of u, v, w is a triple product of such lengths: 9 roundings of terms
 // below reach m |d| for T.(d x e2), a shift of 2u reach m for the rounded origin, corner and edges, three of those in w = det - u - v:
 // together below 48u reach m; `bound` = 64u m.
+//
+// triangle_test, of each rung, takes the nearest hits of the `live` lanes. Where a triangle was `picked` for the packet by its box, most tests
+// meet it: to go on in any case costs less than a branch that is often foretold wrongly.
 typedef struct {
     real_n lowest, highest;  // of the three edge functions: one sign for all three means inside
     real_n bound;            // each edge function's error is below it

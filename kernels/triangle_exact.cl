@@ -51,10 +51,11 @@ static __attribute__((noinline)) mask_n triangle_unsure(const Geometry *geometry
     return load_lanes(test);
 }
 
-HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared, mask_n live, Hits *hits) {
+HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared, const int picked, mask_n live,
+                        Hits *hits) {
     const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared);
     mask_n possible = live & (is_at_least(f.lowest, -f.bound) | is_at_most(f.highest, f.bound));
-    if (!any_lane(possible)) return;
+    if (!picked && !any_lane(possible)) return;
     const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared);
     real_n t = plane.t, error = plane.error;
     const mask_n outside = is_less(t + error, rays->t_min) | is_greater(t - error, hits->t);

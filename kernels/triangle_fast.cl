@@ -1,9 +1,10 @@
 // Provides: triangle_test of the rung `fast`: signs of rounded edge functions, no promise at edges.
 // Needs: lanes.cl, rays.cl, geometry.cl, triangle.cl.  Reads: nothing.
-HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared, mask_n live, Hits *hits) {
+HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared, const int picked, mask_n live,
+                        Hits *hits) {
     const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared);
     mask_n hit = live & (is_at_least(f.lowest, (real_n)0) | is_at_most(f.highest, (real_n)0));
-    if (!any_lane(hit)) return;
+    if (!picked && !any_lane(hit)) return;
     const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared);
     const real_n t = plane.t;
     mask_n closer = is_less(t, hits->t);

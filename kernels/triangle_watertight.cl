@@ -41,10 +41,11 @@ static __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometr
     return load_lanes(test);
 }
 
-HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared, mask_n live, Hits *hits) {
+HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared, const int picked, mask_n live,
+                        Hits *hits) {
     const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared);
     mask_n hit = live & (is_at_least(f.lowest, -f.bound) | is_at_most(f.highest, f.bound));
-    if (!any_lane(hit)) return;
+    if (!picked && !any_lane(hit)) return;
     hit &= ~is_equal(rays->skip, (mask_n)slot);  // before float64 is asked: a ray lies in its own triangle's plane, to within its error
     const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared);
     real_n t = plane.t;
