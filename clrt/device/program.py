@@ -50,7 +50,8 @@ SORT_BITS = 3  #: an axis, of the grid of origins by which rays are sorted; meas
 WIDE_STACK = 16  #: entries of the stack of wide trees, where none is deeper: with 16 children a node, few are
 MEDIA_DEPTH = 8  #: nested dielectrics a ray remembers
 #: what stands at a place where no effect adds anything
-_DEFAULTS = {"trace": "        //@ eye_trace", "eye_trace": "        rays_invert(&rays);\n        scene_trace(&geometry, &rays, SHARED_ORIGIN, 0, &hits);", "next": "        break;",
+_DEFAULTS = {"trace": "        //@ eye_trace", "next": "        break;",
+             "eye_trace": "        rays_invert(&rays);\n        scene_trace(&geometry, &rays, SHARED_ORIGIN, 0, &hits);",
              "shadow_trace": "    rays_invert(&rays);\n    scene_trace(&seen, &rays, SHADOW_SHARED_ORIGIN, 1, &hits);",
              "tie": "    closer |= is_equal(t, hits->t) & is_less((mask_n)slot, hits->slot);",
              "eye_rays": "    //@ camera", "camera": "    camera_rays(frame, column, row, &rays);",
