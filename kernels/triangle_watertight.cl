@@ -44,7 +44,8 @@ static __attribute__((noinline)) mask_n triangle_grazing(const Geometry *geometr
 HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared, const int picked, mask_n live,
                         Hits *hits) {
     const EdgeFunctions f = edge_functions(geometry, rays, reach, slot, shared);
-    mask_n hit = live & (is_at_least(f.lowest, -f.bound) | is_at_most(f.highest, f.bound));
+    // A comparison, as masks made of comparisons alone stay in mask registers.
+    mask_n hit = is_less(live, NO_LANES) & (is_at_least(f.lowest, -f.bound) | is_at_most(f.highest, f.bound));
     if (!picked && !any_lane(hit)) return;
     hit &= ~is_equal(rays->skip, (mask_n)slot);  // before float64 is asked: a ray lies in its own triangle's plane, to within its error
     const PlaneHit plane = plane_hit(geometry, rays, reach, slot, shared);
@@ -65,9 +66,10 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
         hit = (hit & ~grazing) | triangle_grazing(&seen, &copy, slot, shared, grazing, &distance);
         t = distance;
     }
+    hit &= is_greater(t, rays->t_min);
     mask_n closer = is_less(t, hits->t);
     //@ tie
-    hit &= is_greater(t, rays->t_min) & closer;
+    hit &= closer;
     //@ accept
     hits->t = choose(hit, t, hits->t);
     hits->slot = choose(hit, (mask_n)slot, hits->slot);
