@@ -11,13 +11,14 @@ from ray_meshes import MESHES
 
 from clrt.generate import soup
 from clrt.kdtree import BASELINES, BUILDERS, build_tree
+from clrt.kdtree.joined import join
 from clrt.kdtree.wide import WideTree, widen
 
 Array = NDArray[Any]
 
 
 def wide_of(tri: Array, width: int, builder: str = "sah") -> WideTree:
-    return widen(build_tree(tri, builder), tri.min(axis=1), tri.max(axis=1), width)
+    return widen(join([build_tree(tri, builder)], [len(tri)]), np.array([len(tri)]), tri.min(axis=1), tri.max(axis=1), width)
 
 
 def below(wide: WideTree, child: int) -> list[int]:
@@ -84,6 +85,36 @@ def test_small_meshes_have_one_node(count: int) -> None:
 
 def test_no_triangle_makes_a_node_without_children() -> None:
     none = np.zeros((0, 3))
-    wide = widen(build_tree(np.zeros((0, 3, 3))), none, none, 8)
+    wide = widen(join([build_tree(np.zeros((0, 3, 3)))], [0]), np.array([0]), none, none, 8)
     assert below(wide, 0) == []
     assert (wide.lo > wide.hi).all()
+
+
+@pytest.mark.parametrize("builder", ["sah", "brute"])
+def test_trees_of_many_objects_are_those_of_each(builder: str) -> None:
+    """Node by node, whatever their numbers: boxes, the order of children, and the triangles below."""
+    random = np.random.default_rng(6)
+    meshes = [random.normal(size=(count, 3, 3)) + 50.0 * random.normal(size=3) for count in (3, 0, 700, 16, 0, 33, 1)]
+    trees, counts = [build_tree(mesh, builder) for mesh in meshes], np.array([len(mesh) for mesh in meshes])
+    tri, firsts = np.concatenate(meshes), np.cumsum(counts) - counts
+    both = widen(join(trees, counts.tolist()), counts, tri.min(axis=1), tri.max(axis=1), 8)
+
+    def compare(node: int, own: WideTree, number: int, first: int) -> None:
+        np.testing.assert_array_equal(both.lo[node], own.lo[number])
+        np.testing.assert_array_equal(both.order[node], own.order[number])
+        for mine, its in zip(both.child[node].tolist(), own.child[number].tolist(), strict=True):
+            if its >= 0:
+                compare(mine, own, its, first)
+            else:
+                block = own.blocks[-1 - its]
+                np.testing.assert_array_equal(both.blocks[-1 - mine], np.where(block >= 0, block + first, -1))
+
+    deepest = 0
+    for root, (mesh, first) in enumerate(zip(meshes, firsts.tolist(), strict=True)):
+        if len(mesh):
+            alone = wide_of(mesh, 8, builder)
+            deepest = max(deepest, alone.depth)
+            compare(root, alone, 0, first)
+        else:
+            assert below(both, root) == []
+    assert both.depth == deepest

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from clrt.device import layout
 from clrt.device.packed import Packed
 from clrt.device.rounding import rounded_down, rounded_up
+from clrt.kdtree.joined import join
 from clrt.kdtree.tree import KdTree
 from clrt.kdtree.wide import WideTree, widen
 
@@ -33,29 +34,26 @@ class WideArrays:
 
 def wide_arrays(packed: Packed, trees: Sequence[KdTree], width: int) -> WideArrays:
     """The wide trees of all objects; triangles that no leaf of a kd-tree names are left out, as they are there."""
-    made, slots, roots = [], [], []
-    node = block = slot = depth = 0
-    for item, order, origin, tree in zip(packed.scene.objects, packed.orders, packed.origins, trees, strict=True):
-        corners = item.vertices[order] - origin
-        wide = widen(tree, corners.min(axis=1), corners.max(axis=1), width)
-        made.append(_records(wide, node, block, packed.real))
-        slots.append(np.where(wide.blocks >= 0, wide.blocks + slot, -1).astype(np.int32))
-        roots.append(node)
-        node, block, slot = node + len(wide.child), block + len(wide.blocks), slot + len(order)
-        depth = max(depth, wide.depth)
+    if not trees:
+        none = np.zeros(0, layout.wide_node(packed.real, width))
+        return WideArrays(none, np.zeros((0, width), np.int32), np.zeros(0, np.int32), _SPARE)
+    same = (packed.origins == packed.origins[0]).all()
+    corners = packed.vertices - (packed.origins[0] if same else np.repeat(packed.origins, packed.slot_counts, axis=0)[:, None])
+    joined = join(trees, [len(item) for item in packed.scene.objects])
+    wide = widen(joined, packed.slot_counts, corners.min(axis=1), corners.max(axis=1), width)
     return WideArrays(
-        nodes=np.concatenate(made) if made else np.zeros(0, layout.wide_node(packed.real, width)),
-        slots=np.concatenate(slots) if slots else np.zeros((0, width), np.int32),
-        roots=np.array(roots, np.int32),
-        stack=-(-(depth + 1) // _SPARE) * _SPARE,
+        nodes=_records(wide, packed.real),
+        slots=wide.blocks.astype(np.int32),
+        roots=np.arange(len(trees), dtype=np.int32),
+        stack=-(-(wide.depth + 1) // _SPARE) * _SPARE,
     )
 
 
-def _records(wide: WideTree, first_node: int, first_block: int, real: type[np.floating]) -> NDArray[np.void]:
+def _records(wide: WideTree, real: type[np.floating]) -> NDArray[np.void]:
     records = np.zeros(len(wide.child), layout.wide_node(real, wide.child.shape[1]))
     records["planes"][:, 0::2] = rounded_down(wide.lo, real).transpose(0, 2, 1)
     records["planes"][:, 1::2] = rounded_up(wide.hi, real).transpose(0, 2, 1)
-    records["child"] = np.where(wide.child >= 0, wide.child + first_node, wide.child - first_block)
+    records["child"] = wide.child
     packed = (wide.order.astype(np.uint32) << (_ORDER_BITS * _OCTANTS).astype(np.uint32)).sum(axis=2, dtype=np.uint32)
     records["order"] = packed.view(np.int32)
     return records

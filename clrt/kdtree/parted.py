@@ -1,4 +1,4 @@
-"""A kd-tree as a tree over triangles, none of them twice: each goes to the leaf of its middle, and large leaves are parted further."""
+"""kd-trees as trees over triangles, none of them twice: each goes to the leaf of its middle, and large leaves are parted further."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clrt.kdtree.arrays import LEAF
-from clrt.kdtree.tree import KdTree
+from clrt.kdtree.joined import JoinedTrees
 
 FloatArray = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -18,15 +18,16 @@ _OCTANTS = 8
 
 @dataclass(frozen=True, eq=False)
 class PartedTree:
-    """Nodes with two children or none, (m,) each, and the order (n,) in which they have the triangles.
+    """Nodes with two children or none, (m,) each, of one tree or several.
 
     axis : along which the children lie; child : the lower one, the upper one follows; count : triangles; a leaf has axis LEAF
-    levels : inner nodes, parents before children
+    roots : (trees,); levels : inner nodes, parents before children
     """
 
     axis: Ints
     child: Ints
     count: Ints
+    roots: Ints
     levels: list[Ints]
 
     def positions(self, octants: int = _OCTANTS) -> Ints:
@@ -36,6 +37,7 @@ class PartedTree:
         """
         negative = (np.arange(octants) >> np.arange(3)[:, None]) & 1
         first = np.zeros((len(self.count), octants), np.int64)
+        first[self.roots] = (np.cumsum(self.count[self.roots]) - self.count[self.roots])[:, None]
         for level in self.levels:
             lower, turned = self.child[level], negative[self.axis[level]]
             first[lower] = first[level] + turned * self.count[lower + 1, None]
@@ -43,27 +45,28 @@ class PartedTree:
         return first
 
 
-def part(tree: KdTree, points: FloatArray, size: int) -> tuple[PartedTree, Ints]:
-    """The tree of `points` (n, 3), the triangles' middles, with at most `size` in a leaf; and the order (n,) of the points in it."""
+def part(tree: JoinedTrees, counts: Ints, points: FloatArray, size: int) -> tuple[PartedTree, Ints]:
+    """The trees of `points` (n, 3), the middles of triangles, `counts` of each tree, with at most `size` in a leaf; and the order (n,) in it.
+    """
     axis, child = tree.split_axis.astype(np.int64), tree.child.astype(np.int64)
     levels: list[Ints] = []
-    level: Ints = np.flatnonzero(axis[:1] != LEAF)
+    level: Ints = tree.roots[axis[tree.roots] != LEAF]
     while level.size:
         levels.append(level)
         level = (child[level, None] + np.arange(2)).ravel()
         level = level[axis[level] != LEAF]
-    leaf = _leaf_of(tree, points)
+    leaf = _leaf_of(tree, np.repeat(tree.roots, counts), points)
     count = np.bincount(leaf, minlength=len(axis))
     for level in reversed(levels):
         count[level] = count[child[level]] + count[child[level] + 1]
-    whole = PartedTree(axis, child, count, levels)
+    whole = PartedTree(axis, child, count, tree.roots, levels)
     widest = _widest(points, leaf, len(axis))
     order = np.lexsort((points[np.arange(len(points)), widest[leaf]], whole.positions(1)[leaf, 0]))
     return _parted(whole, widest, size), order
 
 
-def _leaf_of(tree: KdTree, points: FloatArray) -> Ints:
-    leaf = np.zeros(len(points), np.int64)
+def _leaf_of(tree: JoinedTrees, leaf: Ints, points: FloatArray) -> Ints:
+    """(n,) from the roots on."""
     moving = np.flatnonzero(tree.split_axis[leaf] != LEAF)
     while moving.size:
         node = leaf[moving]
@@ -95,4 +98,4 @@ def _parted(tree: PartedTree, widest: Ints, size: int) -> PartedTree:
         large, along = len(axis) + np.flatnonzero(parts > size), along.repeat(2)[parts > size]
         axis = np.concatenate([axis, np.full(len(parts), LEAF)])
         child, count = np.concatenate([child, np.zeros_like(parts)]), np.concatenate([count, parts])
-    return PartedTree(axis, child, count, levels)
+    return PartedTree(axis, child, count, tree.roots, levels)

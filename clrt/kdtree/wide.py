@@ -1,4 +1,4 @@
-"""A kd-tree made wide, for single rays: nodes of many children over blocks of triangles, each tested by one vector.
+"""kd-trees made wide, for single rays: nodes of many children over blocks of triangles, each tested by one vector.
 
 Subtrees of as many triangles as a block has room for become blocks. Of what lies above, each node takes in descendants so that rays are
 expected to visit few nodes (Wald, Benthin and Boulos, 2008). The planes of the kd-tree order the children from near to far by octant of the
@@ -11,13 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from clrt.kdtree.joined import JoinedTrees
 from clrt.kdtree.parted import FloatArray, Ints, PartedTree, part
-from clrt.kdtree.tree import KdTree
 
 
 @dataclass(frozen=True, eq=False)
 class WideTree:
-    """lo, hi : (nodes, width, 3) float64 boxes of the children; lo > hi where there is none
+    """The first nodes are the roots of all trees, one each.
+
+    lo, hi : (nodes, width, 3) float64 boxes of the children; lo > hi where there is none
     child : (nodes, width) another node, or -1 - a block; -1 where there is none: block 0 is empty
     order : (nodes, width, 8) children from near to far, by octant
     blocks : (blocks, width) triangles, -1 where there is none
@@ -42,11 +44,11 @@ class _Boxed:
     block: Ints
 
 
-def widen(tree: KdTree, lo: FloatArray, hi: FloatArray, width: int) -> WideTree:
-    """The wide tree over triangles with the boxes lo, hi (n, 3), in the coordinates of the kd-tree; node 0 is the root."""
+def widen(tree: JoinedTrees, counts: Ints, lo: FloatArray, hi: FloatArray, width: int) -> WideTree:
+    """The wide trees over triangles, `counts` of each kd-tree, with the boxes lo, hi (n, 3), in the coordinates of their kd-trees."""
     if not len(lo):
-        return _empty(width)
-    parted, order = part(tree, lo / 2.0 + hi / 2.0, width)
+        return _empty(len(counts), width)
+    parted, order = part(tree, counts, lo / 2.0 + hi / 2.0, width)
     places = parted.positions()
     tops = _tops(parted, places[:, 0], width)
     boxed = _boxed(parted, tops, lo[order], hi[order])
@@ -65,9 +67,9 @@ def widen(tree: KdTree, lo: FloatArray, hi: FloatArray, width: int) -> WideTree:
     )
 
 
-def _empty(width: int) -> WideTree:
-    none = np.full((1, width, 3), np.inf)
-    return WideTree(none, -none, np.full((1, width), -1), np.zeros((1, width, 8), np.int64), np.full((1, width), -1), 1)
+def _empty(trees: int, width: int) -> WideTree:
+    none = np.full((trees, width, 3), np.inf)
+    return WideTree(none, -none, np.full((trees, width), -1), np.zeros((trees, width, 8), np.int64), np.full((1, width), -1), 1)
 
 
 def _tops(parted: PartedTree, first: Ints, width: int) -> Ints:
@@ -100,7 +102,7 @@ def _boxed(parted: PartedTree, tops: Ints, lo: FloatArray, hi: FloatArray) -> _B
 def _collapsed(boxed: _Boxed, width: int) -> tuple[Ints, Ints, int]:
     """(nodes, width): which node of the tree below each child is, -1 for none; the numbers of children as WideTree has them; the depth."""
     shares = _shares(boxed, width)
-    roots, rows, children, depth = np.zeros(1, np.int64), [], [], 0
+    roots, rows, children, depth = boxed.tree.roots, [], [], 0
     done = 0
     while len(roots):
         taken = _descendants(boxed, shares, roots, width)
@@ -123,7 +125,7 @@ def _shares(boxed: _Boxed, width: int) -> Ints:
     """
     tree, size = boxed.tree, np.maximum(boxed.hi - boxed.lo, 0.0)
     area = size[:, 0] * size[:, 1] + size[:, 1] * size[:, 2] + size[:, 2] * size[:, 0]
-    area /= max(float(area[0]), np.finfo(np.float64).tiny)
+    area /= np.maximum(area[_roots(tree)], np.finfo(np.float64).tiny)
     visits, shares = np.zeros((len(area), width + 1)), np.zeros((len(area), width + 1), np.int64)
     for level in reversed(tree.levels):
         level = level[(boxed.block[level] == 0) & (tree.count[level] > 0)]
@@ -142,6 +144,15 @@ def _shares(boxed: _Boxed, width: int) -> Ints:
     return shares
 
 
+def _roots(tree: PartedTree) -> Ints:
+    """(m,): of each node the root above it."""
+    above = np.arange(len(tree.count))
+    for level in tree.levels:
+        lower = tree.child[level]
+        above[lower] = above[lower + 1] = above[level]
+    return above
+
+
 def _contracted(boxed: _Boxed, nodes: Ints) -> Ints:
     """Each node, or the one below it that has all of its triangles."""
     tree, nodes = boxed.tree, nodes.copy()
@@ -157,8 +168,9 @@ def _contracted(boxed: _Boxed, nodes: Ints) -> Ints:
 def _descendants(boxed: _Boxed, shares: Ints, roots: Ints, width: int) -> Ints:
     """(k, width) of k nodes the descendants that become their children, -1 where there are fewer."""
     taken = np.full((len(roots), width), -1)
-    row, column, places = np.arange(len(roots)), np.zeros(len(roots), np.int64), np.full(len(roots), width)
-    nodes = _contracted(boxed, roots)
+    row = np.flatnonzero(boxed.tree.count[roots])  # a tree without triangles has no children
+    column, places = np.zeros(len(row), np.int64), np.full(len(row), width)
+    nodes = _contracted(boxed, roots[row])
     share = shares[nodes, 0]
     while row.size:
         ends = (share == 0) | (boxed.block[nodes] > 0)
