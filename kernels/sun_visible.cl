@@ -5,9 +5,12 @@
 // the edge along D. It has the normal M = D x (c - b), and p.M + K, K = -(b + c).M / 2, is D.((b - p) x (c - p)), the edge function of the ray from p:
 // three products and a constant, computed from the given numbers in float64 and rounded once. Seen from the triangle beyond the edge, b and c
 // change places, and every number its sign and nothing else.
-//   With corners and p relative to the local origin, the roundings of M and K and those of products and sums are below (1 + 4)u (|p||M| + |K|),
-//   and |K| is at most |M| times the farther corner. The float64 error is below 4 * 2^-53 |c - b| in M, and with the sum and the products
-//   of K below 16 * 2^-53 (|p| + |corner|) |c - b| in all. With reach >= |p| + |corner|, `bound` = 8u max|M| + 16 * 2^-53 max|c - b| times reach holds.
+//   What counts is how large a result r of the wrong sign can be. With corners and p relative to the local origin, products P_i and
+// S = |P_0| + |P_1| + |P_2| + |K| <= |M| (|p| + |corner|), in r = fl(P_0 + q), q = fl(P_1 + q'), q' = fl(P_2 + K), fused or not, it is off by at most
+// uS (M and K rounded) + uS (products) + u|q'| + u|q| + u|r|. Of the wrong sign, |r| is itself below that, so q is -P_0 and q' is -P_0 - P_1 but for
+// O(u) S: neither is above S/2 + O(u) S. Together below 3u (1 + 16u) S. The float64 error is below 4 * 2^-53 |c - b| in M, and with the
+// sum and the products of K below 16 * 2^-53 (|p| + |corner|) |c - b| in all. With reach >= |p| + |corner|, reach times
+// `bound` = 4u max|M| + 16 * 2^-53 max|c - b| holds both, and its own roundings.
 // The distance is that of rays of any origin: it is asked for where a test is all but a hit.
 
 // What rays to a sun meet: everything, as seen along its direction.
@@ -47,7 +50,7 @@ static __attribute__((noinline)) void prepare_parallel(global const double *vert
         plane->v[a] = (real)normal[1][a];
         plane->w[a] = (real)normal[2][a];
     }
-    plane->bound = (real)(8 * UNIT_ROUNDOFF * steepest + 16 * 0x1p-53 * longest);
+    plane->bound = (real)(4 * UNIT_ROUNDOFF * steepest + 16 * 0x1p-53 * longest);
 }
 
 //@hook geometry_members
