@@ -102,7 +102,7 @@ def render(
     if request:
         accuracy.check_sampled(features)
         request.goal(scene.samples)
-    with _begin_program(scene, features, ladder, opened) as begun:
+    with _begin_program(scene, features, ladder, opened, helped=opening is not None) as begun:
         prepared = build_trees(scene, tree, tell, opened, Store(kernel_cache.own_folder("trees")) if cache else None)
         build_end = time.perf_counter()
         buffers, tracer, source, upload_s = open_tracer(prepared, features, ladder, opened, tell, begun)
@@ -224,13 +224,13 @@ def fill_buffers(prepared: Prepared, features: Features, precision: Precision, d
     return buffers, program.compose(features, precision, lanes, shape), upload_s
 
 
-def _begin_program(scene: Scene, features: Features, precision: Precision, device: Device) -> Compilation:
+def _begin_program(scene: Scene, features: Features, precision: Precision, device: Device, *, helped: bool = False) -> Compilation:
     """Begins to compile the program that the scene will need, as far as is known before it is packed. Raises LimitError."""
     names = {f.name for f in features.active}
     called = Prepared(seen(scene, "instances" in names, "motion" in names), (), ())
     lanes, shape = precision.lanes(device.info.lanes), program_shape(called, features, shares_lights(called.scene, precision, device))
     program.check_limits(precision, lanes, shape, features)
-    return Compilation(device, program.compose(features, precision, lanes, shape), called.scene.triangle_count)
+    return Compilation(device, program.compose(features, precision, lanes, shape), called.scene.triangle_count, helped=helped)
 
 
 def open_tracer(

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from clrt.device import kernel_cache, opencl, pocl_cpu
+from clrt.device.pocl_cpu import POCL as POCL
 from clrt.errors import DeviceError
 
-POCL = "Portable Computing Language"
 INSTALL_HINT = "no OpenCL platform found: install one with  pip install 'pyopencl[pocl]'"
 
 

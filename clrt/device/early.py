@@ -14,11 +14,14 @@ from contextlib import suppress
 from ctypes import byref, c_char_p, c_int32, c_size_t, c_uint32, c_uint64, c_void_p
 from functools import partial
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from clrt.device import context, kernel_cache, lean, opencl, pocl_cpu
-from clrt.device.context import POCL, Device
+from clrt.device import kernel_cache, lean, opencl, pocl_cpu
+from clrt.device.pocl_cpu import POCL
 from clrt.tasks import Task
+
+if TYPE_CHECKING:
+    from clrt.device.context import Device
 
 _SYMBOL = "clrt_in_no_library"
 _SOURCE = f"void {_SYMBOL}(void);\nkernel void nothing(void) {{ {_SYMBOL}(); }}\n"
@@ -36,6 +39,8 @@ def start() -> None:
 
 def open_device(name: str | None = None) -> Device:
     """As `context.open_device`; of the default device, what was begun is taken."""
+    from clrt.device import context  # not before PoCL reads its library: Python takes 10 ms to make its first dataclasses
+
     begun = _starting.pop().result() if _starting else begin()
     return context.open_device(name, begun)
 

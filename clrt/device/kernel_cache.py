@@ -186,6 +186,21 @@ def _alive(process: str) -> bool:
     return process.isdigit() and Path("/proc", process).exists()
 
 
+def _mark(process: int) -> str:
+    return str(Path(os.environ.get(VARIABLE) or _temporary()) / f"{_MARK}{process}")
+
+
+@contextmanager
+def helped_by(process: int) -> Iterator[None]:
+    """While another process compiles for this one: it ends with this one, or is ended, and its mark says nothing of the cache then."""
+    mark = _mark(process)
+    note_unfinished(mark)
+    try:
+        yield
+    finally:
+        discard(mark)
+
+
 @contextmanager
 def loading() -> Iterator[None]:
     """While programs are loaded and launched for the first time: leaves a mark behind if the process dies in it; in any thread."""
@@ -194,14 +209,14 @@ def loading() -> Iterator[None]:
         if not _loading:
             clear_if_one_died()
         _loading += 1
-        mark = Path(os.environ.get(VARIABLE) or _temporary()) / f"{_MARK}{os.getpid()}"
-        note_unfinished(str(mark))
+        mark = _mark(os.getpid())
+        note_unfinished(mark)
         with suppress(OSError):
-            mark.touch()
+            Path(mark).touch()
     try:
         yield
     finally:
         with _lock:
             _loading -= 1
             if not _loading:
-                discard(str(mark))
+                discard(mark)

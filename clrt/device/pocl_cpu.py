@@ -21,6 +21,7 @@ from typing import Any
 
 from clrt.errors import DeviceError
 
+POCL = "Portable Computing Language"  #: its platform
 #: (instruction sets as /proc/cpuinfo names them, processor as LLVM names it), best first: the variants of PoCL's kernel library
 _PROCESSORS: tuple[tuple[set[str], str], ...] = (
     ({"avx512f", "avx512bw", "avx512dq", "avx512vl", "avx512cd"}, "skylake-avx512"),
