@@ -48,7 +48,7 @@ def _compile(device: Device, source: str, triangles: int, helped: bool) -> Any:
     size = multiple(max(1, triangles), LOCAL)
     sizes: Sizes = dict.fromkeys(_PREPARE, ((size,), (LOCAL,))) if triangles else {}
     pocl = device.info.platform == POCL
-    helped = helped and pocl and bool(triangles) and kernel_cache.is_new(kernel_cache.choose_folder())
+    helped = helped and pocl and bool(triangles) and kernel_cache.was_new(kernel_cache.choose_folder())
     with beside.Helper(device.info.name, helped) as helper:
         built = program.build(device, source)
         helper.compile(source, sizes)

@@ -50,7 +50,7 @@ def begin() -> Mapping[int, int]:
 
     Empty where there is a compiled program already, or no such device.
     """
-    new = kernel_cache.is_new(kernel_cache.choose_folder())
+    new = kernel_cache.was_new(kernel_cache.choose_folder())
     try:
         cl = opencl.functions()
         device = _processor(cl)

@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 
 from clrt.files import discard, note_unfinished, temporary_folder
@@ -56,6 +57,12 @@ def is_new(folder: Path) -> bool:
         return not any(re.fullmatch("[A-P]{2}", name) for name in os.listdir(folder))
     except OSError:
         return False
+
+
+@cache
+def was_new(folder: Path) -> bool:
+    """Whether it was new when this process first asked."""
+    return is_new(folder)
 
 
 def remove_failed(word: str) -> None:
