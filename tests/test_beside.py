@@ -18,7 +18,7 @@ SCENE = "E 0 0 -1\nV 0 0 1\nF 45\nR 16 16\nL 5 5 -5\nM 1 0.5 0.2 0.2 0.8 0 1 0\n
 HEAD = """
 import os, sys
 from clrt.device import ahead, beside, kernel_cache
-beside.cores = lambda: 2
+beside.spare_core = lambda: True
 """
 COMMAND = "sys.argv = ['clrt', 'scene.txt', '-q']\nfrom clrt.cli.entry import main\nmain()\n"
 
@@ -77,12 +77,26 @@ def test_picture_is_the_same_however_the_other_process_fares(tmp_path: Path, cha
 
 def test_no_process_where_none_is_wanted_or_no_core_is_spare(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(beside, "_start", lambda device: pytest.fail("a process was begun"))
-    monkeypatch.setattr(beside, "cores", lambda: 1)
+    monkeypatch.setattr(beside, "spare_core", lambda: False)
     with beside.Helper("any", True) as helper:
         helper.compile("", {})
-    monkeypatch.setattr(beside, "cores", lambda: 2)
+    monkeypatch.setattr(beside, "spare_core", lambda: True)
     with beside.Helper("any", False) as helper:
         helper.compile("", {})
+
+
+@pytest.mark.parametrize(("told", "cores", "spare"), [("0 0 0 1/99 7", 2, True), ("0 0 0 3/99 7", 2, True), ("0 0 0 4/99 7", 2, False),
+                                                      ("0 0 0 1/99 7", 1, False), ("", 2, True), (None, 2, True)])  # fmt: skip
+def test_core_is_spare_where_few_things_run(monkeypatch: pytest.MonkeyPatch, told: str | None, cores: int, spare: bool) -> None:
+    def read(path: Path) -> str:
+        assert str(path) == "/proc/loadavg"
+        if told is None:
+            raise FileNotFoundError(path)
+        return told
+
+    monkeypatch.setattr(Path, "read_text", read)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: set(range(cores)), raising=False)
+    assert beside.spare_core() == spare
 
 
 def test_pictures_of_a_program_start_no_process(tmp_path: Path) -> None:

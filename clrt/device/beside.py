@@ -15,6 +15,7 @@ import sys
 import time
 from contextlib import ExitStack, suppress
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clrt.device import kernel_cache
@@ -38,7 +39,7 @@ class Helper:
     def __init__(self, device: str, wanted: bool) -> None:
         self._block = ExitStack()
         self._process = self._pipe = None
-        if wanted and cores() > 1:
+        if wanted and spare_core():
             with suppress(OSError, AttributeError):
                 self._process, self._pipe = _start(device)
 
@@ -68,9 +69,13 @@ class Helper:
             os.close(self._pipe)
 
 
-def cores() -> int:
-    """Of the machine, as far as this process may use them."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def spare_core() -> bool:
+    """Whether a core of those that this process may use waits for work, or soon will: building trees takes less time than compiling."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    running = cores
+    with suppress(OSError, ValueError, IndexError):
+        running = int(Path("/proc/loadavg").read_text().split()[3].partition("/")[0])  # man 5 proc: entities that run now
+    return cores > 1 and running <= cores + 1
 
 
 def _start(device: str) -> tuple[int, int]:
