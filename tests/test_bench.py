@@ -14,6 +14,7 @@ import bench_results
 import numpy as np
 import pytest
 
+from clrt.bench import __main__ as command_line
 from clrt.bench import export, report, scenes, tables_growth, tables_peers, tables_trees
 from clrt.bench.incoherent import closed_room, scattered_rays
 from clrt.bench.marks import marks_of
@@ -395,11 +396,16 @@ def test_quick_run_measures_everything(tmp_path: Path) -> None:
     assert "kd-trees against brute force" in done.stdout
 
 
-def test_faults_of_the_command_line_are_one_line(tmp_path: Path) -> None:
+def test_faults_of_the_command_line_are_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     wrong = (["--from", str(tmp_path / "none.json")], ["--quick", "--write-docs"], ["--scenes", str(tmp_path)], ["--size", "100"],
              ["--only", "imports", "--write-docs"])  # fmt: skip
     for arguments in wrong:
-        done = subprocess.run([sys.executable, "-m", "clrt.bench", *arguments], capture_output=True, text=True, check=False)
-        assert done.returncode == 2
-        assert done.stderr.startswith("clrt: error:")
-        assert len(done.stderr.splitlines()) == 1
+        monkeypatch.setattr(sys, "argv", ["clrt.bench", *arguments])
+        with pytest.raises(SystemExit) as left:
+            command_line.main()
+        assert left.value.code == 2
+        told = capfd.readouterr().err
+        assert told.startswith("clrt: error:")
+        assert len(told.splitlines()) == 1

@@ -262,7 +262,7 @@ def test_scene_comment_holds_by_quadrature_and_on_the_device(device: Device) -> 
     scene = load_scene(SCENES / "gloss.txt")
     found = MEAN.findall((SCENES / "gloss.txt").read_text())
     assert len(found) == 4
-    pictures = device_batches(scene, 128, range(6))
+    pictures = device_batches(scene, 48, range(6))
     for c, r, *color in found:
         column, row, value = int(c), int(r), float(color[0])
         assert expected_gloss(scene, column, row) == pytest.approx(value, rel=4e-3)

@@ -254,16 +254,18 @@ def test_brute_force_leaves_no_test_out(grouped: None) -> None:
     assert image.stats.objects[0].tests_per_ray > 290  # but for packets that miss the object's box, each ray meets each triangle
 
 
-@pytest.mark.parametrize("precision", ["watertight", "exact"])
+@pytest.mark.parametrize(
+    ("precision", "counted"), [("watertight", False), ("exact", False), pytest.param("exact", True, marks=pytest.mark.slow)]
+)
 def test_rays_to_suns_and_mirrored_ones_after_the_eyes_own_go_as_alone(
-    precision: str, device: Device, monkeypatch: pytest.MonkeyPatch
+    precision: str, counted: bool, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One sun from the side, one behind the eye, one that grazes; and a floor far greater than the scene: rays start far away."""
     floor = "T -900 -1.5 -900  -900 -1.5 900  900 -1.5 900"
     mirror = ["M 0.8 0.7 0.6  0.2 0.6 0.2 8  0.5"] if precision == "exact" else []
     scene = soup_scene(700, "sun 1 2 -1", "sun 0 0 -1", "sun 1 0.02 0", *mirror, floor)
     together, alone = (picture(scene, monkeypatch, way, precision=precision) for way in (True, False))
-    if precision == "exact":
+    if counted:
         ways = []
         for least in (1, _ALONE):
             monkeypatch.setattr(program, "GROUPS_FROM", least)

@@ -71,6 +71,7 @@ def test_comment_names_every_pixel_it_gives(name: str) -> None:
     assert text.count("# pixel") == len(expectations(name)), "a line that the pattern does not read"
 
 
+@pytest.mark.matrix(keep=9)
 @pytest.mark.parametrize("name", EFFECTS)
 def test_comment_holds_on_the_device(name: str) -> None:
     pytest.importorskip("pyopencl")
