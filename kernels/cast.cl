@@ -145,3 +145,10 @@ kernel void cast_list(global const double *vertices, global const HitSource *sou
     const double *d = rays->given->direction;
     return sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
 //@end
+//@hook exact_start
+    // `ray_begin` has widened the interval.
+    t_min = multiply_add(abs_n(t_min), (real_n)(R(8.0) * UNIT_ROUNDOFF), t_min);
+//@end
+//@hook exact_end
+        hits.low *= hits.t < 0 ? R(1.0) + R(8.0) * UNIT_ROUNDOFF : R(1.0) - R(8.0) * UNIT_ROUNDOFF;
+//@end

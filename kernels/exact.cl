@@ -40,14 +40,14 @@ static inline void plane_distance_double(const Geometry *geometry, const double 
     triple_double(corner, e1, e2, &plane->offset, &plane->offset_error);
 }
 
-static inline void plane_double(const Geometry *geometry, const double *origin, const double *direction, int slot, Plane *plane) {
+// The edge functions alone.
+static inline void plane_edges_double(const Geometry *geometry, const double *origin, const double *direction, int slot, Plane *plane) {
     global const double *v = geometry->vertices + 9 * (size_t)slot;
     double corner[3][3];
     for (int a = 0; a < 3; a++)
         for (int c = 0; c < 3; c++) corner[c][a] = v[3 * c + a] - origin[a];
     for (int c = 0; c < 3; c++)
         triple_double(direction, corner[(c + 1) % 3], corner[(c + 2) % 3], plane->edge + c, plane->edge_error + c);
-    plane_distance_double(geometry, origin, direction, slot, plane);
 }
 
 // The same numbers without error, made only where float64 cannot decide.

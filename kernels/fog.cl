@@ -50,3 +50,6 @@ HOT void fog_mote(global const Frame *frame, const Draws *draws, const uint path
             weight *= exp(-frame->fog_density * hits.t);
         }
 //@end
+//@hook planar
+    planar &= is_less(load_lanes(hit->slot), (mask_n)geometry->slot_count);
+//@end

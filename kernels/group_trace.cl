@@ -27,11 +27,17 @@ HOT void group_far(Group *group) {
     group->far = far < 0 ? -1.0f : (float)(far + R(0x1p-22) * far);
 }
 
+HOT real_n group_reach(const Geometry *geometry, const Rays *rays, global const DirectionBoxes *boxes, const int shared) {
+    return shared == SHARED_ORIGIN ? (real_n)0 : rays_reach(rays, geometry->objects + geometry->surfaces[boxes->item[0]].object);
+}
+
+//@ group_decide
 // The triangles of a block that are left of the group's bounds in `picked`, packet by packet; none is nearer than `near`.
 HOT void group_test(const Geometry *geometry, Group *group, global const DirectionBoxes *boxes, uint picked, float near, const int shared,
                     const int any_hit) {
     const real reached = (real)near - R(0x1p-22) * (real)near;
     int changed = 0;
+    //@ group_begin
     // All packets are compared before any is tested, without a branch between them.
     uint each[GROUP], some = 0;
     #pragma unroll
@@ -47,13 +53,14 @@ HOT void group_test(const Geometry *geometry, Group *group, global const Directi
         if (!any_lane(active & is_at_least(hits.t, (real_n)reached))) continue;
         const Rays *rays = group->rays + p;
         //@ count_met
-        const real_n reach = shared == SHARED_ORIGIN ? (real_n)0 : rays_reach(rays, geometry->objects + geometry->surfaces[boxes->item[0]].object);
-        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared, 1, active, &hits);
+        const real_n reach = group_reach(geometry, rays, boxes, shared);
+        //@ group_tests
         group->hits[p] = hits;
         if (any_hit) group->active[p] = active & is_less(hits.slot, NO_LANES);
         // How far rays go does not change with what they meet where any hit will do.
         changed |= !any_hit || !any_lane(group->active[p]);
     }
+    //@ group_tested
     if (changed) group_far(group);
 }
 
@@ -171,3 +178,6 @@ static __attribute__((noinline)) void group_trace(const Geometry *geometry, cons
         for (int p = 0; p < count; p++) scene_rest(geometry, group.rays + p, group.active[p], SHARED_ORIGIN, any_hit, group.hits + p);
     }
 }
+//@hook group_tests_default
+        for (; met; met &= met - 1) triangle_test(geometry, rays, reach, boxes->item[first_bit(met)], shared, 1, active, &hits);
+//@end

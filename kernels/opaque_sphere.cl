@@ -8,7 +8,7 @@ static __attribute__((noinline)) void opaque_spheres(const Geometry *geometry, c
     real o[3][LANES], d[3][LANES], t_min[LANES], t_max[LANES], root[2][LANES], where[3 * LANES], kept[LANES];
     store_lanes(rays->skip, skip);
     store_lanes(rays->t_min, t_min);
-    store_lanes(rays->t_max, t_max);
+    store_lanes(abs_n(rays->t_max), t_max);
     for (int a = 0; a < 3; a++) {
         store_lanes(rays->origin[a], o[a]);
         store_lanes(rays->direction[a], d[a]);

@@ -10,6 +10,12 @@ static inline double normal_bound(const double *e1, const double *e2, const doub
     return 8 * UNIT_ROUNDOFF * length_double(normal) + 16 * 0x1p-53 * length_double(e1) * length_double(e2);
 }
 
+// The power of two that brings a length into [1, 2).
+static inline double power_below(double length) {
+    const long biased = (long)(as_ulong(length) >> 52);
+    return as_double((ulong)(2046 - (biased > 2045 ? 2045 : biased)) << 52);
+}
+
 static __attribute__((noinline)) void prepare_triangle(global const double *vertices, int slot, const double *origin, global Triangle *triangles) {
     double e1[3], e2[3], normal[3];
     for (int a = 0; a < 3; a++) {
@@ -46,11 +52,13 @@ static __attribute__((noinline)) void prepare_planes(global const double *vertic
         planes->w[a] = (real)edge[2][a];
     }
     cross_double(e1, e2, normal);
-    for (int a = 0; a < 3; a++) planes->normal[a] = (real)normal[a];
-    planes->offset = (real)dot_double(corner[0], normal);
-    planes->bound = (real)(8 * UNIT_ROUNDOFF * steepest + 16 * 0x1p-53 * longest);
-    planes->normal_bound = (real)normal_bound(e1, e2, normal);
-    planes->offset_bound = (real)(16 * 0x1p-53 * length_double(corner[0]) * length_double(e1) * length_double(e2));
+    const double offset = dot_double(corner[0], normal), size = length_double(normal), bound = normal_bound(e1, e2, normal);
+    const double offset_error = 16 * 0x1p-53 * length_double(corner[0]) * length_double(e1) * length_double(e2), scale = power_below(size);
+    for (int a = 0; a < 3; a++) planes->normal[a] = (real)(scale * normal[a]);
+    planes->offset = (real)(scale * offset);
+    planes->bound = (real)(3 * UNIT_ROUNDOFF * steepest + 16 * 0x1p-53 * longest);
+    planes->normal_bound = (real)(scale * bound);
+    planes->t_bound = (real)((2 + 0x1p-18) * ((scale * fabs(offset)) * (scale * bound) + (scale * size) * (scale * offset_error)) + 0x1p-120);
 }
 
 // What is prepared, an item a work-item up to `count`: triangles for rays of any origin, relative to the local one; planes as seen from a

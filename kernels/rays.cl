@@ -11,7 +11,7 @@ typedef struct {
     real_n origin[3];
     real_n direction[3];  // unit length to within 4u
     real_n inverse[3];    // 1 / direction, bounded by HUGE_INVERSE so that no product with a finite distance is NaN
-    real_n t_min, t_max;  // hits lie strictly between
+    real_n t_min, t_max;  // hits lie strictly between; on the rung `exact` a t_max below 0 means that the plane of `skip` ends the ray, about -t_max away
     mask_n octant;        // bit a set: the direction's component a is negative
     real_n scale;         // |origin|, plus the extent of the scene where corners are rounded: what distances inherit errors from
     mask_n skip;          // a triangle slot each ray passes by (the one it starts on or ends at), or -1

@@ -109,3 +109,11 @@ HOT void smooth_lift(const Geometry *geometry, Hit *hit) {
     }
     own |= hit->curved & is_at_most(dot_n(hit->geometric, to_light), (real_n)0);
 //@end
+//@hook planar
+    // Not so a ray to a lifted point, nor one that comes from behind the plane: there the triangle itself may stand between.
+    planar &= is_less(dot_n(hit->geometric, span), (real_n)0);
+    for (int a = 0; a < 3; a++) planar &= is_equal(end[a], hit->point[a]);
+//@end
+//@hook planar_end
+    planar &= is_at_least(rays.skip, NO_LANES);
+//@end

@@ -138,3 +138,9 @@ HOT void sphere_surface(const Geometry *geometry, Hit *hit) {
 //@hook hit_surface
     sphere_surface(geometry, hit);
 //@end
+//@hook hit_flat
+    flat &= is_less(hits->slot, (mask_n)geometry->slot_count);
+//@end
+//@hook planar
+    planar &= is_less(load_lanes(hit->slot), (mask_n)geometry->slot_count);
+//@end

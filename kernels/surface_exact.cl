@@ -22,6 +22,10 @@ HOT void cross_lanes(const double_n *a, const double_n *b, double_n *c) {
     c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
+// At least 1 / x, by no more than 14%, for x >= 0; a number too large to matter for 0. x = 2^e (1 + m) has the bits (127 + e, m), 0x7f000000 less these is
+// 2^-e (1 - m/2), which is between 1 / x and 1.125 / x; a hundredth of the last power of two is added, for the roundings of what it multiplies.
+HOT real_n reciprocal_above(real_n x) { return as_real_n((mask_n)0x7f014000 - as_mask_n(x)); }
+
 // As triple_double of exact.cl, all lanes at once.
 HOT void triple_lanes(const double_n *d, const double_n *p, const double_n *q, double_n *value, double_n *error) {
     double_n sum = 0, size = 0;
@@ -88,7 +92,9 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
 }
 
 //@hook hit_distance
-    t = choose(hit->found & is_less(hits->slot, (mask_n)geometry->slot_count), R(0.5) * (hits->t + hits->low), t);
+    mask_n flat = hit->found;
+    //@ hit_flat
+    t = choose(flat, R(0.5) * (hits->t + hits->low), t);
 //@end
 //@hook opacity_distance
         t = R(0.5) * (hits.t + hits.low);
@@ -102,20 +108,20 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
     error = refined_error;
 //@end
 //@hook shadow_above
-    // A ray that ends on a flat triangle ends at its plane, compared exactly: no offset hides what touches it. Not so one that comes
-    // from behind the plane: there the triangle itself may stand between, and the end must be on the viewer's side.
-    mask_n planar = is_less(load_lanes(hit->slot), (mask_n)geometry->slot_count) & is_less(dot_n(hit->geometric, span), (real_n)0);
-    for (int a = 0; a < 3; a++) planar &= is_equal(end[a], hit->point[a]);
+    // A ray that ends on a flat triangle ends at its plane, compared exactly: no offset hides what touches it. Lights that shine on it are above it.
+    mask_n planar = ALL_LANES;
     //@ planar
     above = choose(planar, (real_n)0, above);
 //@end
 //@hook shadow_limit
-    // The plane lies at the ray's length to within the point's error and the ray's own, which is half of `offset`.
-    planar &= is_at_least(rays.skip, NO_LANES);
-    const real_n slack = R(1.01) * (hit->error + R(0.5) * offset) / abs_n(dot_n(hit->geometric, rays.direction));
-    rays.limit = choose(planar, rays.skip, (mask_n)-1);
-    hits.t = choose(planar, length + slack, hits.t);
-    hits.low = choose(planar, length - slack, hits.low);
+    //@ planar_end
+    // The ray is at its length where `end` is, to within half of `offset`, and that is at the plane to within the point's error along the normal: so
+    // its way to the plane is off by that over the cosine between them. facing is off by less than 2 `offset`.
+    const real_n facing = max_n(multiply_add((real_n)R(-2.0), offset, -dot_n(hit->geometric, span)), (real_n)0);
+    const real_n slack = (hit->error + R(0.5) * offset) * (length * reciprocal_above(facing));
+    rays.t_max = choose(planar, -length, length);
+    hits.t = choose(planar, length + slack, length);
+    hits.low = choose(planar, length - slack, length);
 //@end
 //@hook reach_start
     const Geometry seen = *geometry;

@@ -3,8 +3,10 @@
 //
 // Rays that share their origin o (the eye, a point light) use planes through o and each edge, N = b x c of the corners seen from o,
 // computed from the given numbers in float64 and rounded once (prepare.cl): a test is three dot products.
-//   |fl(d.N) - d.N| <= (1 + 3)u |d||N| (one rounding of N; a dot product, Higham 2002 3.1; 5u unfused), so `bound` = 8u max|N|
-//   holds for |d| <= 1 + 4u; the float64 error of N itself, 16 * 2^-53 max|b||c|, is added to it.
+// What counts is how large a result r of the wrong sign can be. With P_i the products and S = |P_1| + |P_2| + |P_3| <= |d||N|, in
+// r = fl(q + P_3), q = fl(P_1 + P_2), fused or not, it is off by at most uS (N rounded) + uS (products) + u|q| + u|r|. Of the wrong sign, |r| is
+// itself below that, so q is -P_3 but for O(u): |q| <= S/2 + O(u) S. Together below 2.5u (1 + 16u) |N| for |d| <= 1 + 4u: `bound` = 3u max|N|, to which the
+// float64 error of N itself, 16 * 2^-53 max|b||c|, is added. Beyond it the sign of r is right.
 // Other rays use Moeller and Trumbore (1997) on v0, e1, e2, rounded from the given numbers relative to the local origin. With
 // reach >= |o - v0| + |e| and m = max(|e1|, |e2|), each of u, v, w is a triple product of such lengths: 9 roundings of terms
 // below reach m |d| for T.(d x e2), a shift of 2u reach m for the rounded origin, corner and edges, three of those in w = det - u - v:
@@ -54,24 +56,27 @@ HOT void fetch_test(const Geometry *geometry, int slot, const int shared) {
 }
 
 // The distance to the triangle's plane, t = offset / rate with offset = n.(v0 - o), rate = n.d.
-//   rate is off by (1 + 3)u |n||d| and d times the float64 error of n, offset by u of itself and the float64 error of n.(v0 - o),
-//   `offset_bound` (shared origin), or by 8u reach |n| (rounded origin and corner, difference, dot product) and reach times the
+//   rate is off by (1 + 3)u |n||d| and d times the float64 error of n, offset by u of itself and the float64 error of n.(v0 - o)
+//   (shared origin), or by 8u reach |n| (rounded origin and corner, difference, dot product) and reach times the
 //   error of n, the quotient by 2u. Rates below 2 (8u |n|) are grazing; above, the true rate is more than half of
 //   the computed one, and with |rate| <= |n||d|, t is off by less than (2 |t|) (8u |n|) / |rate|, or
 //   2 (|t| + reach) (8u |n|) / |rate|; normal_bound is 8u |n| and 4 times the error of n.
+//   For a shared origin with |t| = |offset / rate| and 1 <= |n| (1 + 9u) / |rate| all of it is t_bound / rate^2, with
+//   t_bound = 2 (|offset| normal_bound + |n| the float64 error of n.(v0 - o)), raised by 2^-19 for its own roundings; n and offset are scaled by
+//   a power of two, which changes no t, so that it stays in range.
 typedef struct {
     real_n t, error;
     mask_n grazing;  // lanes that run so nearly inside the plane that t means nothing
 } PlaneHit;
 
 HOT PlaneHit plane_hit(const Geometry *geometry, const Rays *rays, real_n reach, int slot, const int shared) {
-    real_n offset, rate, normal_bound, offset_error;
+    real_n offset, rate, normal_bound, t_bound, offset_error;
     if (shared == SHARED_ORIGIN) {
         global const EdgePlanes *plane = geometry->planes + slot;
         offset = (real_n)plane->offset;
         rate = dot_uniform(rays->direction, plane->normal);
         normal_bound = (real_n)plane->normal_bound;
-        offset_error = (real_n)plane->offset_bound;
+        t_bound = (real_n)plane->t_bound;
     } else {
         global const Triangle *triangle = geometry->triangles + slot;
         const real_n to_corner[3] = {triangle->v0[0] - rays->origin[0], triangle->v0[1] - rays->origin[1], triangle->v0[2] - rays->origin[2]};
@@ -83,7 +88,8 @@ HOT PlaneHit plane_hit(const Geometry *geometry, const Rays *rays, real_n reach,
     PlaneHit hit;
     const real_n inverse = R(1.0) / rate;
     hit.t = offset * inverse;
-    hit.error = multiply_add(abs_n(hit.t), normal_bound, offset_error) * abs_n(R(2.0) * inverse);
+    if (shared == SHARED_ORIGIN) hit.error = inverse * inverse * t_bound;
+    else hit.error = multiply_add(abs_n(hit.t), normal_bound, offset_error) * abs_n(R(2.0) * inverse);
     hit.grazing = is_at_most(abs_n(rate), R(2.0) * normal_bound);
     return hit;
 }

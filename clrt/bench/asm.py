@@ -23,7 +23,7 @@ from clrt.generate import make
 from clrt.precision import DEFAULT, RUNGS
 
 #: what a rung's test of a triangle calls, for the few lanes that float32 cannot decide, and how their rays get there
-RARE = {"triangle_grazing", "triangle_unsure", "memcpy"}
+RARE = {"triangle_grazing", "triangle_unsure", "group_decide", "memcpy"}
 _TRAVERSAL = ("triangle.cl", "kdtree.cl")  #: files, the one that says most of a loop first
 _SIDE = 32
 

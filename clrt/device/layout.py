@@ -43,7 +43,7 @@ def edge_planes(real: type) -> np.dtype[np.void]:
     """A triangle for rays of one shared origin: planes through it and each edge. 64 bytes in float32."""
     vector: Any = (real, (3,))
     return struct_dtype([("u", *vector), ("v", *vector), ("w", *vector), ("normal", *vector), ("offset", real), ("bound", real),
-                         ("normal_bound", real), ("offset_bound", real)])  # fmt: skip
+                         ("normal_bound", real), ("t_bound", real)])  # fmt: skip
 
 
 def parallel_planes(real: type) -> np.dtype[np.void]:
