@@ -27,7 +27,8 @@ from clrt.tasks import Task
 
 HEAD = "E 0 0 -1\nV 0 0 1\nF 45\nR 32 24\nL 5 5 -5\nM 1 0.5 0.2 0.2 0.8 0 1 0\n"
 NOT_FOR_ALL = {  # what most renders of a scene text have no use for
-    "PIL", "rich", "trimesh", "pyopencl", "pytools", "importlib.metadata", "importlib.resources", "scipy", "jinja2", "matplotlib", "OpenImageIO", "fractions", "numpy.ma", "numpy.polynomial",
+    "PIL", "rich", "trimesh", "pyopencl", "pytools", "importlib.metadata", "importlib.resources", "tempfile",
+    "scipy", "jinja2", "matplotlib", "OpenImageIO", "fractions", "numpy.ma", "numpy.polynomial",
     "numpy.random", "clrt.adaptive.engine",
     "clrt.scene.models.gltf", "clrt.mesh", "clrt.kdtree.coverage", "clrt.explain", "clrt.study", "clrt.verify", "clrt.bench",
 }  # fmt: skip

@@ -41,6 +41,8 @@ def gather(found: Declarations) -> Soup:
     plain, faced, smooth = found.get("T", 9), found.get("T", 12), found.get("T", 18)
     lines = np.sort(np.concatenate([plain.lines, faced.lines, smooth.lines]))
     n = len(lines)
+    if len(plain) == n:  # with lines and numbers as they stand, those of other runs among them, which are read only
+        return Soup(lines, plain.values.reshape(-1, 3, 3).copy(), np.zeros((n, 3)), np.zeros(n, np.bool_), np.zeros(n, np.bool_), None)
     soup = Soup(
         lines, np.empty((n, 3, 3)), np.zeros((n, 3)), np.isin(lines, faced.lines), np.isin(lines, smooth.lines),
         np.zeros((n, 3, 3)) if len(smooth) else None,
@@ -138,15 +140,17 @@ def _object(
     soup: Soup, normals: FloatArray, vertex_normals: FloatArray | None, material_ids: IntArray,
     rows: NDArray[np.int64], first_prim: int, number: int, uvs: FloatArray | None,
 ) -> MeshObject:  # fmt: skip
-    """One object of the triangles `rows`, copied out of the soup."""
-    smooth_lines = soup.lines[rows][soup.smooth[rows]]
+    """One object of the ascending triangles `rows`: a part of the soup, or copied out of it."""
+    in_a_row = int(rows[-1]) - int(rows[0]) == len(rows) - 1
+    part = slice(int(rows[0]), int(rows[-1]) + 1) if in_a_row else rows
+    smooth_lines = soup.lines[part][soup.smooth[part]]
     return MeshObject(
-        vertices=soup.vertices[rows],
-        normals=normals[rows],
-        material_ids=material_ids[rows],
+        vertices=soup.vertices[part],
+        normals=normals[part],
+        material_ids=material_ids[part],
         first_prim=first_prim,
-        vertex_normals=vertex_normals[rows] if vertex_normals is not None and len(smooth_lines) else None,
+        vertex_normals=vertex_normals[part] if vertex_normals is not None and len(smooth_lines) else None,
         name=f"object {number}",
         line=int(smooth_lines[0]) if len(smooth_lines) else 0,
-        uvs=uvs[rows] if uvs is not None else None,
+        uvs=uvs[part] if uvs is not None else None,
     )
