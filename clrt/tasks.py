@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections.abc import Callable
 from types import TracebackType
@@ -27,6 +28,9 @@ class Task(Generic[T]):
         self._thread.start()
 
     def _run(self) -> None:
+        if hasattr(signal, "pthread_sigmask"):
+            # Ctrl-C is the main thread's: a compiler that it interrupts while it reads a file says that there is an error.
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self._value.append(self._call())
         except BaseException as error:

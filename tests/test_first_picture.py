@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -240,6 +241,13 @@ def test_task_gives_its_value_and_its_error() -> None:
     for _ in range(2):
         with pytest.raises(KeyError):
             task.result()
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="the system has no masks of signals")
+def test_task_leaves_interrupts_to_the_main_thread() -> None:
+    blocked = Task(lambda: signal.pthread_sigmask(signal.SIG_BLOCK, ())).result()
+    assert signal.SIGINT in blocked
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 def test_task_is_over_when_an_error_leaves_its_block() -> None:
