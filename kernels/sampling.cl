@@ -23,12 +23,14 @@ HOT void sampling_camera(global const Frame *frame, int column, int row, uint sa
     //@ sample_pixel
     s = s / (real)frame->width;
     t = t / (real)frame->height;
+    #pragma unroll
     for (int a = 0; a < 3; a++) {
         rays->origin[a] = (real_n)frame->eye_local[a];
         rays->direction[a] = frame->corner[a] + s * frame->along_row[a] + t * frame->along_column[a] + s * t * frame->twist[a];
     }
     //@ sample_origin
     const real_n scale = R(1.0) / sqrt(dot_n(rays->direction, rays->direction));
+    #pragma unroll
     for (int a = 0; a < 3; a++) rays->direction[a] *= scale;
     rays->t_min = (real_n)0;
     rays->t_max = (real_n)INFINITY;
