@@ -8,8 +8,11 @@
 #define absolute_lanes(x) PASTE(as_double, LANES)(PASTE(as_long, LANES)(x) & 0x7fffffffffffffffL)
 #define first_if_less(a, b, x, y) choose((a) < (b), x, y)
 #endif
-#define gather_double(result, expression)                           \
-    {                                                               \
+#define gather_double(same, result, expression)                     \
+    if (same) {                                                     \
+        const int k = 0;                                            \
+        result = (double_n)(expression);                            \
+    } else {                                                        \
         double lane_[LANES];                                        \
         for (int k = 0; k < LANES; k++) lane_[k] = (expression);    \
         result = load_lanes(lane_);                                 \
@@ -50,12 +53,13 @@ static __attribute__((noinline)) void refine_points(const Geometry *geometry, co
     if (!any_lane(refined)) return;
     lane_int slot[LANES];
     store_lanes(choose(refined, load_lanes(hit->slot), NO_LANES), slot);
+    const int same = all_same(slot);
     double_n origin[3], direction[3], v[3], e1[3], e2[3], corner[3];
     for (int a = 0; a < 3; a++) {
         double_n v1, v2;
-        gather_double(v[a], geometry->vertices[9 * (size_t)slot[k] + a]);
-        gather_double(v1, geometry->vertices[9 * (size_t)slot[k] + 3 + a]);
-        gather_double(v2, geometry->vertices[9 * (size_t)slot[k] + 6 + a]);
+        gather_double(same, v[a], geometry->vertices[9 * (size_t)slot[k] + a]);
+        gather_double(same, v1, geometry->vertices[9 * (size_t)slot[k] + 3 + a]);
+        gather_double(same, v2, geometry->vertices[9 * (size_t)slot[k] + 6 + a]);
         e1[a] = v1 - v[a];
         e2[a] = v2 - v[a];
         origin[a] = shared == SHARED_ORIGIN ? (double_n)geometry->shared_origin[a] : geometry->local_origin[a] + to_double_n(rays->origin[a]);
