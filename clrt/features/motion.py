@@ -7,8 +7,10 @@ from clrt.scene.model import Scene
 
 
 def _object_caller(scene: Scene) -> int | None:
+    if scene.shutter is None:
+        return None
     lines = [o.motion_line for i, o in enumerate(scene.objects) if any(o.motion) and (not o.hidden or _placed(scene, i))]
-    return min(lines) if lines and scene.shutter is not None else None
+    return min(lines, default=None)
 
 
 def _placed(scene: Scene, number: int) -> bool:

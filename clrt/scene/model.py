@@ -383,7 +383,7 @@ class Scene:
         """(objects, 3): the least and the greatest coordinates of each object's own triangles; zeros where there are none."""
         return boxes_of(self.objects)
 
-    @property
+    @cached_property
     def triangle_count(self) -> int:
         return sum(len(o) for o in self.objects)
 
