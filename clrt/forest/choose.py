@@ -24,6 +24,7 @@ VARIABLE = "CLRT_TREES"
 WAYS = ("auto", "numpy", "device")
 READY_FROM = 16_000  #: triangles from which on kernels are sooner that only have to be loaded (docs/kdtree.md has the measurement)
 FRESH_FROM = 500_000  #: the same for kernels that have to be compiled
+_FEW = 100  #: meshes up to which each is gone through by itself, which takes one pass over its triangles in place of two
 _TREE = 150  #: triangles whose building takes NumPy as long as what every tree takes, even the smallest
 
 Tell = Callable[[float], None]
@@ -101,8 +102,13 @@ def _by_device(meshes: Sequence[F64], origins: F64, device: Device, tell: Tell) 
 
 def _corners(meshes: Sequence[F64], origins: F64, counts: Ints) -> F64:
     """(n, 3, 3): the triangles of all meshes, each less its origin; checked."""
-    corners = np.concatenate(meshes, dtype=np.float64)
-    corners -= origins[0] if (origins == origins[0]).all() else np.repeat(origins, counts, axis=0)[:, None]
+    corners = np.empty((int(counts.sum()), 3, 3))
+    if len(meshes) <= _FEW:
+        for mesh, origin, end in zip(meshes, origins, np.cumsum(counts), strict=True):
+            np.subtract(mesh, origin, out=corners[end - len(mesh) : end])
+    else:
+        np.concatenate(meshes, out=corners)
+        corners -= np.repeat(origins, counts, axis=0)[:, None]
     try:
         return checked_vertices(corners)
     except MeshError:
