@@ -216,7 +216,7 @@ def test_every_point_of_a_triangle_is_in_its_box_along_a_sun(grouped: None, devi
 # Pictures.
 
 
-@pytest.mark.matrix(keep=2)
+@pytest.mark.matrix(keep=1)
 @pytest.mark.parametrize("path", sorted(SCENES.glob("*.txt")), ids=lambda path: path.stem)
 def test_picture_of_packets_together_is_that_of_packets_alone(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """On the rung `exact` each ray meets one triangle, whatever way it goes; coincident ones aside, at a distance of the same bits."""

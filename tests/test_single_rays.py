@@ -121,11 +121,11 @@ def test_every_width_compiles_to_the_same_picture(lanes: int, device: Device, mo
 def test_a_deep_wide_tree_has_room_on_the_stack(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = replace(parse_scene(SCENES["indirect"]), samples=2)
     prepared, features = build_trees(scene, "sah", silent), Features.of(scene)
-    buffers, tracer, source, _ = open_tracer(prepared, features, rung("exact"), device, silent)
+    buffers, tracer, source, _ = open_tracer(prepared, features, rung("fast"), device, silent)
     assert buffers.wide_stack == program.WIDE_STACK
     assert f"#define WIDE_STACK {program.WIDE_STACK}\n" in source
     monkeypatch.setattr(program, "WIDE_STACK", 1)
-    deep, deep_tracer, deep_source, _ = open_tracer(prepared, features, rung("exact"), device, silent)
+    deep, deep_tracer, deep_source, _ = open_tracer(prepared, features, rung("fast"), device, silent)
     assert deep.wide_stack > 1
     assert f"#define WIDE_STACK {deep.wide_stack}\n" in deep_source
     for each in (tracer, deep_tracer):
