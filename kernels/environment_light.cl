@@ -36,11 +36,13 @@ static __attribute__((noinline)) void environment_draw(global const Frame *frame
                                                        const Draws *draws, const uint path, real *direction, lane_int *cell, real *chance) {
     const int width = frame->environment_width, stride = sizeof(EnvironmentRow) / sizeof(uint), lit_rows = frame->environment_lit;
     global const uint *beginnings = (global const uint *)&rows->begin;
-    const uint dimension = 2 * (16 * path + USE_ENVIRONMENT);
+    word_n first, second;
+    uint downs[LANES], rights[LANES];
+    sampler_words(sampler_pixels(draws->pixel), draws->sample, 2 * (16 * path + USE_ENVIRONMENT), draws->seed, &first, &second);
+    store_words(first, downs);
+    store_words(second, rights);
     for (int k = 0; k < LANES; k++) {
-        const uint pixel = draws->pixel + (((uint)(k / PACKET_WIDTH) << 16) | (uint)(k % PACKET_WIDTH));
-        const uint down = sampler_word(pixel, draws->sample, dimension, draws->seed);
-        const uint right = sampler_word(pixel, draws->sample, dimension + 1, draws->seed);
+        const uint down = downs[k], right = rights[k];
         const int j = environment_search(beginnings, stride, lit_rows, down);
         global const EnvironmentRow *row = rows + j;
         global const uint *cells = columns + (size_t)j * width;

@@ -33,13 +33,11 @@ HOT void lens_disc(real_n x, real_n y, real_n *to_right, real_n *to_up) {
 }
 
 //@hook sample_origin
-    for (int k = 0; k < LANES; k++) {
-        x[k] = R(2.0) * uniform_from_word(sampler_word(pixel[k], sample, 2, seed)) - R(1.0);
-        y[k] = R(2.0) * uniform_from_word(sampler_word(pixel[k], sample, 3, seed)) - R(1.0);
-    }
+    real_n across, upwards;
+    sampler_pair(pixels, sample, 2, seed, &across, &upwards);
     const real_n slope = dot_uniform(rays->direction, frame->lens_axis);
     real_n to_right, to_up;
-    lens_disc(load_lanes(x), load_lanes(y), &to_right, &to_up);
+    lens_disc(R(2.0) * across - R(1.0), R(2.0) * upwards - R(1.0), &to_right, &to_up);
     for (int a = 0; a < 3; a++) {
         const real_n place = to_right * frame->lens_right[a] + to_up * frame->lens_up[a];
         rays->origin[a] += place;

@@ -1,5 +1,5 @@
 // Provides: Draws, path_pair: random numbers for what a packet's rays draw on their ways.
-// Needs: sampler.cl, sampling.cl (sample, seed).  Reads: PACKET_WIDTH.
+// Needs: sampler.cl, sampling.cl (sample, seed).  Reads: nothing.
 //
 // Each ray of a sample has a number, `path`: 1 for the eye's, and one by hashing for each that goes on from it. Pair 16 path + use of the
 // sampler's dimensions serves one use at the hit of that ray; the pairs below 16 are those of the pixel, the lens and the time.
@@ -20,15 +20,7 @@ typedef struct {
 
 // Two numbers of [0, 1) a lane.
 HOT void path_pair(const Draws *draws, const uint path, const uint use, real_n *first, real_n *second) {
-    const uint dimension = 2 * (16 * path + use);
-    real u[LANES], v[LANES];
-    for (int k = 0; k < LANES; k++) {
-        const uint pixel = draws->pixel + (((uint)(k / PACKET_WIDTH) << 16) | (uint)(k % PACKET_WIDTH));
-        u[k] = uniform_from_word(sampler_word(pixel, draws->sample, dimension, draws->seed));
-        v[k] = uniform_from_word(sampler_word(pixel, draws->sample, dimension + 1, draws->seed));
-    }
-    *first = load_lanes(u);
-    *second = load_lanes(v);
+    sampler_pair(sampler_pixels(draws->pixel), draws->sample, 2 * (16 * path + use), draws->seed, first, second);
 }
 
 //@hook drawn

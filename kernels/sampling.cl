@@ -10,11 +10,10 @@
 // The rays of camera_rays, moved from the pixel's centre and the eye by what effects add. `extent` is as in rays_check.
 HOT void sampling_camera(global const Frame *frame, int column, int row, uint sample, uint seed, Rays *rays) {
     real x[LANES], y[LANES];
-    uint pixel[LANES];
+    const word_n pixels = sampler_pixels(((uint)row << 16) | (uint)column);
     for (int k = 0; k < LANES; k++) {
         x[k] = column + k % PACKET_WIDTH;
         y[k] = row + k / PACKET_WIDTH;
-        pixel[k] = ((uint)(row + k / PACKET_WIDTH) << 16) | (uint)(column + k % PACKET_WIDTH);
     }
     const real_n px = load_lanes(x), py = load_lanes(y);
     rays->active = is_less(px, (real_n)frame->width) & is_less(py, (real_n)frame->height);

@@ -9,7 +9,11 @@ from clrt.precision import RUNGS, rung
 from clrt.verify import probe
 
 _UNIFORM = """
-kernel void probe_uniform(global const uint *word, global real *u) { u[get_global_id(0)] = uniform_from_word(word[get_global_id(0)]); }
+kernel void probe_uniform(global const uint *word, global real *u) {
+    real number[LANES];
+    store_lanes(uniform_from_words((word_n)word[get_global_id(0)]), number);
+    u[get_global_id(0)] = number[get_global_id(0) % LANES];
+}
 """
 _FRESNEL = """
 kernel void probe_fresnel(global const real *c, global const real *n1, global const real *n2, global real *back, global real *through) {

@@ -12,13 +12,23 @@ from clrt.verify import probe
 _KERNELS = """
 kernel void probe_sobol(global const uint *index, global const uint *dimension, global uint *word) {
     const int i = get_global_id(0);
-    word[i] = sampler_reverse(sampler_sobol(index[i], dimension[i]));
+    uint lane[LANES];
+    store_words(sampler_reverse(sampler_sobol((word_n)index[i], dimension[i])), lane);
+    word[i] = lane[i % LANES];
 }
 kernel void probe_word(global const uint *pixel, global const uint *sample, global const uint *dimension, global const uint *seed,
                        global uint *word, global real *u) {
     const int i = get_global_id(0);
-    word[i] = sampler_word(pixel[i], sample[i], dimension[i], seed[i]);
-    u[i] = uniform_from_word(word[i]);
+    uint lane[LANES];
+    for (int k = 0; k < LANES; k++) lane[k] = pixel[i] + k - i % LANES;
+    word_n first, second;
+    sampler_words(load_words(lane), sample[i], dimension[i] & ~1u, seed[i], &first, &second);
+    const word_n words = dimension[i] % 2 ? second : first;
+    store_words(words, lane);
+    word[i] = lane[i % LANES];
+    real number[LANES];
+    store_lanes(uniform_from_words(words), number);
+    u[i] = number[i % LANES];
 }
 """
 #: points 0 to 7 of the first two dimensions, in eighths (Sobol 1967; Joe and Kuo 2008), in the order of the index's bits

@@ -27,7 +27,9 @@ from clrt.verify.case import ALL, Context, Outcome, case
 _UNIFORM = """
 kernel void probe_uniform(global const uint *word, global real *u, global real *logarithm) {
     const int i = get_global_id(0);
-    u[i] = uniform_from_word(word[i]);
+    real number[LANES];
+    store_lanes(uniform_from_words((word_n)word[i]), number);
+    u[i] = number[i % LANES];
     logarithm[i] = log(R(1.0) - u[i]);
 }
 """
