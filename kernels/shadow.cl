@@ -70,6 +70,6 @@ HOT mask_n shadow_lit(const Geometry *geometry, global const Light *light, int i
 //@hook visible
         mask_n clear = NO_LANES;
         //@ visible_known
-        if (any_lane(lit)) lit = shadow_lit(geometry, light, i, hit, lit);
+        if (HAVE_SHADOWS && any_lane(lit)) lit = shadow_lit(geometry, light, i, hit, lit);
         lit |= clear;
 //@end

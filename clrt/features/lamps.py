@@ -46,6 +46,7 @@ SHADOWS = Feature(
     parameters=(("light_planes", "global const EdgePlanes *light_planes"),),
     rays=("shadow",),
     needs=(DIRECT_LIGHT,),
+    switch=True,
 )
 SPOT = Feature(
     "spot", _spot_caller, "spot.cl", early=True, light=(("axis", REAL, (3,)), ("edge", REAL), ("slope", REAL)), needs=(DIRECT_LIGHT,)
