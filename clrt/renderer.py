@@ -17,7 +17,7 @@ from clrt.device.ahead import Compilation
 from clrt.device.context import Device, open_device
 from clrt.device.pack import pack, tree_origins
 from clrt.device.prepare import prepare
-from clrt.device.session import Buffers, Tracer, check_picture, shares_lights
+from clrt.device.session import Buffers, Tracer, check_picture, shares_lights, shares_suns
 from clrt.errors import ClrtError, LimitError
 from clrt.features import Features
 from clrt.features.choice import effect_names, not_called_for
@@ -190,7 +190,9 @@ def build_trees(scene: Scene, tree: str, tell: Progress, device: Device | None =
     return Prepared(scene, tuple(trees), tuple(seconds))
 
 
-def program_shape(prepared: Prepared, features: Features, shared_lights: bool, wide: int = program.WIDE_STACK) -> program.Shape:
+def program_shape(
+    prepared: Prepared, features: Features, shared_lights: bool, wide: int = program.WIDE_STACK, shared_suns: bool = True
+) -> program.Shape:
     """The sizes that the program of these features is compiled for: trees as deep as they may become, so that they need not be there."""
     bounces = any(f.name == "bounce" for f in features.active)
     scene = prepared.scene
@@ -200,7 +202,7 @@ def program_shape(prepared: Prepared, features: Features, shared_lights: bool, w
     boxes = depth_limit(len(scene.objects) + placement_count(scene) + len(scene.spheres))
     return program.Shape(
         program.stack_size(deepest), scene.depth if bounces else 0, shared_lights, program.stack_size(boxes), wide=wide,
-        groups=program.groups_pay(features, scene.triangle_count),
+        groups=program.groups_pay(features, scene.triangle_count), shared_suns=shared_suns,
     )  # fmt: skip
 
 
@@ -220,7 +222,7 @@ def fill_buffers(prepared: Prepared, features: Features, precision: Precision, d
     packed = pack(prepared.scene, prepared.trees, features, precision)
     buffers = Buffers(device, packed, features, precision, program.groups_pay(features, prepared.scene.triangle_count))
     upload_s = time.perf_counter() - start
-    shape = program_shape(prepared, features, buffers.shared_lights, buffers.wide_stack)
+    shape = program_shape(prepared, features, buffers.shared_lights, buffers.wide_stack, buffers.shared_suns)
     return buffers, program.compose(features, precision, lanes, shape), upload_s
 
 
@@ -228,7 +230,8 @@ def _begin_program(scene: Scene, features: Features, precision: Precision, devic
     """Begins to compile the program that the scene will need, as far as is known before it is packed. Raises LimitError."""
     names = {f.name for f in features.active}
     called = Prepared(seen(scene, "instances" in names, "motion" in names), (), ())
-    lanes, shape = precision.lanes(device.info.lanes), program_shape(called, features, shares_lights(called.scene, precision, device))
+    shared = [shares(called.scene, precision, device) for shares in (shares_lights, shares_suns)]
+    lanes, shape = precision.lanes(device.info.lanes), program_shape(called, features, shared[0], shared_suns=shared[1])
     program.check_limits(precision, lanes, shape, features)
     return Compilation(device, program.compose(features, precision, lanes, shape), called.scene.triangle_count, helped=helped)
 
@@ -289,7 +292,9 @@ def _count(prepared: Prepared, buffers: Buffers, stats: RunStats, tell: Progress
     """The same picture again by the counting build, by the same launches if it was made of replicates: rays by kind, tests by object."""
     precision, device = buffers.precision, buffers.device
     lanes = precision.lanes(device.info.lanes)
-    shape = program_shape(_as_called(prepared, buffers.features), buffers.features, buffers.shared_lights, buffers.wide_stack)
+    shape = program_shape(
+        _as_called(prepared, buffers.features), buffers.features, buffers.shared_lights, buffers.wide_stack, buffers.shared_suns
+    )
     tracer = Tracer(
         buffers, program.build(device, program.compose(buffers.features, precision, lanes, shape, counting=True)), counting=True
     )

@@ -130,7 +130,7 @@ HOT void block_test(global const Block *block, const Rays *rays, int k, real rea
     const block_n u = t0 * p0 + t1 * p1 + t2 * p2;
     const block_n v = d[0] * q0 + d[1] * q1 + d[2] * q2;
     const block_n w = (p0 * e10 + p1 * e11 + p2 * e12) - u - v;
-    const block_n bound = reach * load_block(block->bound), lowest = min_block(min_block(u, v), w), highest = max_block(max_block(u, v), w);
+    const block_n bound = reach * load_block(block->bound) + UNDERFLOWN, lowest = min_block(min_block(u, v), w), highest = max_block(max_block(u, v), w);
     found->possible = block_bits((lowest >= -bound) | (highest <= bound));
     if (!found->possible) return;
     const block_n n0 = load_block(block->normal[0]), n1 = load_block(block->normal[1]), n2 = load_block(block->normal[2]);

@@ -10,7 +10,7 @@
 //   most L / sqrt(3) (Jung 1901). So x / |x|, which is in the projection, lies within 1 - sqrt(1 - L^2 / 3) of x, and the box of the corners holds
 //   the projection once it is wider by that.
 //   Boxes are kept as whole numbers of steps, rounded outwards, from the middle of the scene as seen from o: `boxes_scale` below. Directions
-//   are off unit length by at most 4u = 2^-22, and rounded twice more on their way to steps: boxes are wider by WIDENING, four times as much,
+//   are off unit length by at most 5u < 2^-21, and rounded twice more on their way to steps: boxes are wider by WIDENING, twice as much,
 //   and by a step: what the true ray meets is never left out, on any rung.
 #define WIDENING 0x1p-20
 

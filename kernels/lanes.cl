@@ -17,6 +17,7 @@ typedef long lane_int;
 #define LANE_INT_NAME long
 #define UNIT_ROUNDOFF 0x1p-53
 #define TINY_COMPONENT 0x1p-500
+#define UNDERFLOWN 0x1p-1060  // above the error of a few products below the range of `real`
 #define HUGE_INVERSE 0x1p500
 #define REAL_MAX DBL_MAX
 #define WITHOUT_SIGN ((mask_n)0x7fffffffffffffffL)
@@ -28,6 +29,7 @@ typedef int lane_int;
 #define LANE_INT_NAME int
 #define UNIT_ROUNDOFF 0x1p-24f
 #define TINY_COMPONENT 0x1p-90f
+#define UNDERFLOWN 0x1p-140f
 #define HUGE_INVERSE 0x1p90f
 #define REAL_MAX FLT_MAX
 #define WITHOUT_SIGN ((mask_n)0x7fffffff)

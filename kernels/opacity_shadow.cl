@@ -67,7 +67,7 @@ static __attribute__((noinline)) void opacity_through(const Geometry *geometry, 
     if (any_lane(blocked)) {
         const Geometry all = *geometry;
         const Rays copy = towards;
-        opacity_through(&all, &copy, 0, &open, blocked, geometry->let_through);
+        opacity_through(&all, &copy, shared, &open, blocked, geometry->let_through);
         hits.slot = choose(blocked & is_greater(*geometry->let_through, (real_n)0), (mask_n)-1, hits.slot);
     }
 //@end

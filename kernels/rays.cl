@@ -1,15 +1,15 @@
 // Provides: Rays, Hits; SHARED_NOTHING, SHARED_ORIGIN, SHARED_DIRECTION; rays_check, rays_invert, rays_prepare, ray_point.
 // Needs: lanes.cl.  Reads: nothing.
 
-// What the rays of a packet share, and others that go with it: their origin is geometry->shared_origin.
+// What the rays of a packet share, and those of others that records are made for.
 #define SHARED_NOTHING 0
-#define SHARED_ORIGIN 1
-#define SHARED_DIRECTION 2
+#define SHARED_ORIGIN 1     // geometry->shared_origin, which geometry->planes are seen from
+#define SHARED_DIRECTION 2  // along which geometry->parallel are
 
 // LANES rays. `active` lanes are traced; the others hold anything finite.
 typedef struct {
     real_n origin[3];
-    real_n direction[3];  // unit length to within 4u
+    real_n direction[3];  // unit length to within 5u
     real_n inverse[3];    // 1 / direction, bounded by HUGE_INVERSE so that no product with a finite distance is NaN
     real_n t_min, t_max;  // hits lie strictly between; on the rung `exact` a t_max below 0 means that the plane of `skip` ends the ray, about -t_max away
     mask_n octant;        // bit a set: the direction's component a is negative

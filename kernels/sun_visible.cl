@@ -66,7 +66,7 @@ static __attribute__((noinline)) void prepare_parallel(global const double *vert
         u = place_uniform(rays->origin, plane->u);
         v = place_uniform(rays->origin, plane->v);
         w = place_uniform(rays->origin, plane->w);
-        f.bound = reach * plane->bound;
+        f.bound = multiply_add(reach, (real_n)plane->bound, (real_n)UNDERFLOWN);
     }
 //@end
 //@hook fetch_test

@@ -10,7 +10,8 @@
 // Other rays use Moeller and Trumbore (1997) on v0, e1, e2, rounded from the given numbers relative to the local origin. With
 // reach >= |o - v0| + |e| and m = max(|e1|, |e2|), each of u, v, w is a triple product of such lengths: 9 roundings of terms
 // below reach m |d| for T.(d x e2), a shift of 2u reach m for the rounded origin, corner and edges, three of those in w = det - u - v:
-// together below 48u reach m; `bound` = 64u m.
+// together below 48u reach m; `bound` = 64u m. UNDERFLOWN is more than what products lose that are too small for `real`, of tiny triangles
+// with rays from near them.
 //
 // triangle_test, of each rung, takes the nearest hits of the `live` lanes. Where a triangle was `picked` for the packet by its box, most tests
 // meet it: to go on in any case costs less than a branch that is often foretold wrongly.
@@ -41,7 +42,7 @@ HOT EdgeFunctions edge_functions(const Geometry *geometry, const Rays *rays, rea
         u = dot_n(t, p);
         v = dot_n(d, q);
         w = dot_uniform(p, e1) - u - v;
-        f.bound = reach * triangle->bound;
+        f.bound = multiply_add(reach, (real_n)triangle->bound, (real_n)UNDERFLOWN);
     }
     f.lowest = min_n(min_n(u, v), w);
     f.highest = max_n(max_n(u, v), w);
@@ -63,7 +64,7 @@ HOT void fetch_test(const Geometry *geometry, int slot, const int shared) {
 //   2 (|t| + reach) (8u |n|) / |rate|; normal_bound is 8u |n| and 4 times the error of n.
 //   For a shared origin with |t| = |offset / rate| and 1 <= |n| (1 + 9u) / |rate| all of it is t_bound / rate^2, with
 //   t_bound = 2 (|offset| normal_bound + |n| the float64 error of n.(v0 - o)), raised by 2^-19 for its own roundings; n and offset are scaled by
-//   a power of two, which changes no t, so that it stays in range.
+//   a power of two, which changes no t, so that it stays in range; n of other rays, too.
 typedef struct {
     real_n t, error;
     mask_n grazing;  // lanes that run so nearly inside the plane that t means nothing

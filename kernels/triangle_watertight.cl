@@ -54,9 +54,10 @@ HOT void triangle_test(const Geometry *geometry, const Rays *rays, real_n reach,
     mask_n grazing = plane.grazing;
     if (shared != SHARED_ORIGIN) grazing |= is_at_most(abs_n(t - rays->t_min), plane.error);
     // Where all three edge functions are near their error they say little: seen edge-on, rays near the plane would hit from far beside. Such a ray has
-    // two of them within `bound` of one side, so the third below their sum S plus 2 bound. Above 8 bound, S is above 6 bound, and what hits
-    // wrongly is within a sixth of the triangle's size of it, as slivers are; below, float64 decides.
-    grazing |= is_at_least(f.lowest, R(-8.0) * f.bound) & is_at_most(f.highest, R(8.0) * f.bound);
+    // two of them within `bound` of one side, so the third below their sum S plus 2 bound. Above `little` = m bound, S is above (m - 2) bound, and
+    // what hits wrongly is within 1 / (m - 2) of the triangle's size of it, as slivers are; below, float64 decides. Bounds differ by what rays share.
+    const real_n little = (shared == SHARED_NOTHING ? R(8.0) : shared == SHARED_ORIGIN ? R(22.0) : R(64.0)) * f.bound;
+    grazing |= is_at_least(f.lowest, -little) & is_at_most(f.highest, little);
     grazing &= hit;
     if (any_lane(grazing)) {
         // Copies go to the function: what it is given by pointer could not stay in registers here.

@@ -39,7 +39,7 @@ def ray_counts(
     scene = renderer.with_options(scene, None, None, samples, 0)
     prepared = renderer.build_trees(scene, "sah", _quiet)
     buffers, _, _ = renderer.fill_buffers(prepared, features, rung(precision), device)
-    shape = renderer.program_shape(prepared, features, buffers.shared_lights, buffers.wide_stack)
+    shape = renderer.program_shape(prepared, features, buffers.shared_lights, buffers.wide_stack, buffers.shared_suns)
     built = program.build(device, program.compose(features, buffers.precision, buffers.lanes, shape, counting=True))
     prepare(buffers, built)
     tracer = Tracer(buffers, built, counting=True)

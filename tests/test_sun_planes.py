@@ -26,7 +26,7 @@ PROBE = """
 kernel void probe(global const Frame *frame, global const int2 *nodes, global const int *indices, global const Triangle *triangles,
                   global const EdgePlanes *eye_planes, global const double *vertices, global const Object *objects,
                   global const Surface *surfaces, global const Sun *suns, global const ParallelPlanes *sun_planes,
-                  global const float *starts, volatile global int *decided, global int *found) {
+                  global const float *starts, int skip, volatile global int *decided, global int *found) {
     Geometry geometry = scene_geometry(frame, nodes, indices, triangles, eye_planes, vertices, objects, surfaces);
     geometry.parallel = sun_planes;
     DECIDED
@@ -40,7 +40,7 @@ kernel void probe(global const Frame *frame, global const int2 *nodes, global co
     }
     rays.t_min = (real_n)0;
     rays.t_max = (real_n)INFINITY;
-    rays.skip = (mask_n)-1;
+    rays.skip = (mask_n)skip;
     rays.active = ~NO_LANES;
     rays_prepare(&rays, frame->extent);
     Hits hits;
@@ -55,11 +55,12 @@ kernel void probe(global const Frame *frame, global const int2 *nodes, global co
 """
 
 
-def scene_of(corners: NDArray[np.float64], sun: str) -> Scene:
-    """corners : (n, 3, 3)"""
+def scene_of(corners: NDArray[np.float64], sun: str, *others: NDArray[np.float64]) -> Scene:
+    """An object of triangles (n, 3, 3), and others."""
     lines = ["E 0 0 -9", "V 0 0 1", "F 40", "R 8 8", f"sun {sun}", "M 1 1 1  0 1 0 1  0"]
-    lines += ["T " + "  ".join(" ".join(map(repr, corner)) for corner in t) for t in corners.tolist()]
-    return parse_scene("\n".join([*lines, "O", ""]))
+    for item in (corners, *others):
+        lines += ["T " + "  ".join(" ".join(map(repr, corner)) for corner in t) for t in item.tolist()] + ["O"]
+    return parse_scene("\n".join([*lines, ""]))
 
 
 def filled(scene: Scene, precision: str, device: Device) -> tuple[Buffers, object, str]:
@@ -73,7 +74,9 @@ def filled(scene: Scene, precision: str, device: Device) -> tuple[Buffers, objec
     return buffers, built, source
 
 
-def hits(scene: Scene, starts: NDArray[np.float32], precision: str, device: Device) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+def hits(
+    scene: Scene, starts: NDArray[np.float32], precision: str, device: Device, skip: int = -1
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Primitive ids of the first hits of rays to the sun: by the device, by rational arithmetic. `starts` : from the local origin."""
     buffers, built, _ = filled(scene, precision, device)
     starts = starts[: len(starts) // buffers.lanes * buffers.lanes]
@@ -82,7 +85,9 @@ def hits(scene: Scene, starts: NDArray[np.float32], precision: str, device: Devi
     nodes, indices, objects, surfaces, _materials = buffers.core
     given = buffers.frame, nodes, indices, buffers.triangles, buffers.eye_planes, buffers.vertices, objects, surfaces
     effects = buffers.effects["suns"], buffers.effects["sun_planes"]
-    cl.Kernel(built, "probe")(device.queue, (len(starts) // buffers.lanes,), (1,), *given, *effects, buffers.upload(starts), decided, found)
+    cl.Kernel(built, "probe")(
+        device.queue, (len(starts) // buffers.lanes,), (1,), *given, *effects, buffers.upload(starts), np.int32(skip), decided, found
+    )
     prims = np.empty(len(starts), np.int32)
     cl.enqueue_copy(device.queue, prims, found)
     direction = np.asarray(scene.suns[0].direction).astype(buffers.precision.real).astype(np.float64)
@@ -191,6 +196,55 @@ def test_signs_of_edge_functions_along_a_sun_are_right_beyond_their_bound(precis
     assert max(wrong) > 0.01, "a bound a hundred times too wide would send every ray to float64"
 
 
+#: size and place of a globe: so far from the world's origin that starts of rays are rounded there by more than float32 rounds
+#: beside them; far smaller than the scene, so that products of its numbers have no room in float32
+EXTREMES = {"far off": (1.0, [1e13, -3e13, 2e13]), "tiny": (1e-21, [0.0, 0.0, 0.0])}
+
+
+@pytest.mark.parametrize("precision", ["watertight", "exact"])
+@pytest.mark.parametrize("extreme", list(EXTREMES))
+def test_no_ray_along_a_sun_is_lost_far_from_the_origin_or_on_what_is_tiny(extreme: str, precision: str, device: Device) -> None:
+    size, place = EXTREMES[extreme]
+    globe = _corners(uv_sphere(200)) * size + np.array(place)
+    around = np.array([[[-1.0, 9.0, -1.0], [1.0, 9.0, -1.0], [0.0, 9.0, 1.0]], [[-1.0, -9.0, -1.0], [1.0, -9.0, -1.0], [0.0, -9.0, 1.0]]])
+    scene = scene_of(globe, "1 2 -1", around + np.array(place))
+    random = np.random.default_rng(8)
+    weights = random.dirichlet([0.4, 0.4, 0.4], 16384)
+    weights[:, 0] = 0.0
+    points = np.einsum("nc,nca->na", weights / weights.sum(1, keepdims=True), globe[random.integers(len(globe), size=len(weights))])
+    rounded = max(np.spacing(np.abs(place).max()), 1e-7 * size)
+    points += rounded * random.normal(size=points.shape) * 10.0 ** random.uniform(-4.0, 1.0, (len(points), 1))
+    way = size * random.uniform(0.5, 3.0, (len(weights), 1)) * np.asarray(scene.suns[0].direction)
+    found, expected = hits(scene, (points - way - local_origin(scene)).astype(np.float32), precision, device)
+    assert (expected >= 0).mean() > 0.8
+    assert (found[expected >= 0] >= 0).all()
+    if precision == "exact":
+        np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-4, 3e-5])
+def test_watertight_needles_do_not_reach_beyond_their_tips(width: float, device: Device) -> None:
+    """Of rays beside the tip of a needle of length 1, none that passes by farther than a fiftieth of it is stopped."""
+    needle = np.array([[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, width, 1.0]], [[-3.0, -3.0, 1.5], [-2.9, -3.0, 1.5], [-3.0, -2.9, 1.5]]])
+    scene = scene_of(needle, "0 0 1")
+    beyond = np.linspace(-0.2, -0.02, 1600)
+    starts = np.stack([beyond, np.random.default_rng(2).uniform(-2e-6, 2e-6, 1600), np.zeros(1600)], axis=1)
+    found, expected = hits(scene, (starts - local_origin(scene)).astype(np.float32), "watertight", device)
+    assert (expected < 0).all()
+    assert (found < 0).all()
+
+
+@pytest.mark.parametrize("precision", ["fast", "watertight", "exact"])
+def test_a_ray_passes_by_the_triangle_that_it_starts_on(precision: str, device: Device) -> None:
+    """Started just below it, where it is met for sure."""
+    triangle = np.array([[-1.0, -1.0, 1.0], [3.0, -1.0, 1.0], [-1.0, 3.0, 1.0]])
+    scene = scene_of(np.stack([triangle, triangle + 9.0]), "0 0 1")
+    starts = (np.random.default_rng(4).uniform(-0.9, 0.9, (64, 3)) * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.999]) - local_origin(scene)
+    for skip, met in ((-1, 0), (0, -1)):
+        found, _ = hits(scene, starts.astype(np.float32), precision, device, skip)
+        np.testing.assert_array_equal(found, met)
+
+
 def test_triangles_at_an_edge_have_the_same_plane_along_a_sun_with_the_other_sign(device: Device) -> None:
     scene = scene_of(_corners(uv_sphere(300)), "1 2 -1")
     buffers, _, _ = filled(scene, "watertight", device)
@@ -212,7 +266,7 @@ def test_without_room_for_planes_rays_to_suns_are_as_all_others(monkeypatch: pyt
     scene = scene_of(np.concatenate([_corners(uv_sphere(200)), ground]), "1 2 -1")
     pictures = [renderer.render(scene, precision="exact", size=(64, 48)).pixels]
     for module in (session, renderer):
-        monkeypatch.setattr(module, "shares_lights", lambda *given: False)
+        monkeypatch.setattr(module, "shares_suns", lambda *given: False)
     buffers, _, source = filled(scene, "exact", device)
     assert f"#define SUN_SHARED {program.SHARED_NOTHING}\n" in source
     assert buffers.effects["sun_planes"].size == layout.parallel_planes(np.float32).itemsize

@@ -28,7 +28,7 @@ FLOOR = "M 1 1 0.5  0.1 0.9 0.3 20  0.3\nT -9 -1 12 9 -1 12 9 -1 0.5\nT -9 -1 12
 SUN = "sun 2 3 -1 red=0.9 green=0.8 blue=0.5\n"
 SPOT = "spot -2 3 1  2 -3.2 1.7  50 softness=0.6\n"
 BOUND = 1e-5  #: docs/effects: what both effects match the reference to
-MARGIN = 5e-5  #: rays of any origin see edges up to 64u times the reach of a ray wide: 4e-6 times about 8 here
+MARGIN = 2e-5
 
 
 def _mesh(smooth: bool) -> str:

@@ -110,7 +110,7 @@ def pack(scene: Scene, trees: Sequence[KdTree], features: Features, precision: P
     owners = _owners(scene)[order]
     counts = np.bincount(owners, minlength=len(trees))
     vertices = np.take(in_a_row([item.vertices for item in scene.objects], np.float64, (3, 3)), order, 0)
-    objects = _objects(trees, joined, vertices, counts, real)
+    objects = _objects(trees, joined, origin, vertices, counts, real)
     return Packed(
         scene=scene,
         origin=origin,
@@ -145,16 +145,24 @@ def _prim_ids(scene: Scene, order: NDArray[np.int64], owners: NDArray[np.int32])
 
 
 def _objects(
-    trees: Sequence[KdTree], joined: JoinedTrees, vertices: FloatArray, counts: NDArray[np.int64], real: type[np.floating]
+    trees: Sequence[KdTree],
+    joined: JoinedTrees,
+    origin: FloatArray,
+    vertices: FloatArray,
+    counts: NDArray[np.int64],
+    real: type[np.floating],
 ) -> NDArray[np.void]:
-    """vertices : (s, 3, 3), `counts` of each object"""
+    """origin : (3,), what trees are relative to; vertices : (s, 3, 3), `counts` of each object"""
     records = np.zeros(len(trees), layout.object_record(real))
     lo, hi = np.array([(tree.lo, tree.hi) for tree in trees]).reshape(-1, 2, 3).transpose(1, 0, 2)
     records["lo"], records["hi"] = rounded_down(lo, real), rounded_up(hi, real)
     longest, some = np.zeros(len(trees)), counts > 0
     if some.any():
         longest[some] = np.maximum.reduceat(_longest_edges(vertices), (np.cumsum(counts) - counts)[some])
-    records["extent"] = rounded_up(np.maximum(np.abs(lo), np.abs(hi)).sum(1) + longest, real)
+    # Where float64 decides, it takes the starts of rays as the world has them, rounded by 2^-53 of the way from its origin: 4u of this is
+    # four times as much, so bounds hold for both.
+    away = 2.0**-29 * np.abs(origin).sum()
+    records["extent"] = rounded_up(np.maximum(np.abs(lo), np.abs(hi)).sum(1) + longest + away, real)
     records["root"] = joined.roots
     return records
 

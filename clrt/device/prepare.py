@@ -53,7 +53,7 @@ class _Launches:
         if "light_planes" in buffers.effects and buffers.shared_lights:
             for i, light in enumerate(self.lights):
                 self._launch(_PLANES, packed.slots, light, i * packed.slots, packed.slots, planes=buffers.effects["light_planes"])
-        if "sun_planes" in buffers.effects and program.suns_share(buffers.features, buffers.shared_lights):
+        if "sun_planes" in buffers.effects and program.suns_share(buffers.features, buffers.shared_suns):
             for i, sun in enumerate(packed.scene.suns):
                 self._launch(_PARALLEL, packed.slots, packed.origin, i * packed.slots, packed.slots, along=np.asarray(sun.direction))
         if buffers.boxes and buffers.box_count:

@@ -75,7 +75,7 @@ class Shape:
 
     stack : entries of the traversal stack, at least the depth of the deepest tree
     depth : greatest number of bounces
-    shared_lights : whether edge planes as seen from the lights, and along suns, are at hand
+    shared_lights, shared_suns : whether edge planes as seen from the lights, along the suns are at hand
     tree : entries of the stack of the tree over boxes, at least its depth
     block : of arrays of rays, the triangles that are tested at once
     wide : entries of the stack of wide trees, at least the depth of the deepest
@@ -89,6 +89,7 @@ class Shape:
     block: int = 0
     wide: int = WIDE_STACK
     groups: bool = False
+    shared_suns: bool = True
 
 
 def bounce_stack(features: Features, depth: int) -> int:
@@ -125,9 +126,9 @@ def suns_grouped(features: Features, lanes: int, shape: Shape) -> bool:
     return shape.groups and lanes > 1 and "sun shadows" in names and names.isdisjoint(("opacity shadows", "fog"))
 
 
-def suns_share(features: Features, shared_lights: bool) -> bool:
+def suns_share(features: Features, shared_suns: bool) -> bool:
     """Whether rays to suns are tested by planes along their direction (sun_visible.cl): not where objects have spaces of their own."""
-    return shared_lights and "placed" not in {f.name for f in features.active}
+    return shared_suns and "placed" not in {f.name for f in features.active}
 
 
 def item_size(lanes: int, groups: bool) -> tuple[int, int]:
@@ -206,7 +207,7 @@ def _defines(features: Features, precision: Precision, lanes: int, shape: Shape,
     if "shadows" in names:
         values["SHADOW_SHARED_ORIGIN"] = int(shape.shared_lights)
     if "sun shadows" in names:
-        values["SUN_SHARED"] = SHARED_DIRECTION if suns_share(features, shape.shared_lights) else SHARED_NOTHING
+        values["SUN_SHARED"] = SHARED_DIRECTION if suns_share(features, shape.shared_suns) else SHARED_NOTHING
     if "bounce" in names:
         values["BOUNCE_STACK"] = bounce_stack(features, shape.depth)
     if "object tree" in names:

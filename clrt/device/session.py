@@ -41,19 +41,32 @@ def check_picture(device: Device, width: int, height: int) -> None:
 
 
 def shares_lights(scene: Scene, precision: Precision, device: Device, slots: int | None = None) -> bool:
-    """Whether edge planes of every light and sun, of so many slots (default: of all triangles), fit in the device's memory."""
+    """Whether edge planes of every light, of so many slots (default: of all triangles), fit in the device's memory."""
+    return _have_room(device, _of_lights(scene, precision, slots), 0)
+
+
+def shares_suns(scene: Scene, precision: Precision, device: Device, slots: int | None = None) -> bool:
+    """Whether those along every sun fit beside them."""
     count = scene.triangle_count if slots is None else slots
-    from_lights = max(1, count) * layout.edge_planes(precision.real).itemsize * len(scene.lights_with_position)
-    along_suns = max(1, count) * layout.parallel_planes(precision.real).itemsize * len(scene.suns)
-    return bool(
-        max(from_lights, along_suns) <= device.handle.max_mem_alloc_size and from_lights + along_suns <= device.handle.global_mem_size // 4
-    )
+    size = max(1, count) * layout.parallel_planes(precision.real).itemsize * len(scene.suns)
+    return _have_room(device, size, _of_lights(scene, precision, slots) if shares_lights(scene, precision, device, slots) else 0)
+
+
+def _of_lights(scene: Scene, precision: Precision, slots: int | None) -> int:
+    """Bytes of the planes of every light."""
+    count = scene.triangle_count if slots is None else slots
+    return max(1, count) * layout.edge_planes(precision.real).itemsize * len(scene.lights_with_position)
+
+
+def _have_room(device: Device, size: int, beside: int) -> bool:
+    return bool(size <= device.handle.max_mem_alloc_size and size + beside <= device.handle.global_mem_size // 4)
 
 
 class Buffers:
     """The device's copy of a packed scene.
 
-    groups : whether packets of its pictures go together; shared_lights : whether edge planes of every light and sun fit in memory
+    groups : whether packets of its pictures go together
+    shared_lights, shared_suns : whether edge planes of every light, of every sun fit in memory
     """
 
     def __init__(self, device: Device, packed: Packed, features: Features, precision: Precision, groups: bool = False) -> None:
@@ -63,6 +76,7 @@ class Buffers:
         self.groups = groups and self.lanes > 1
         self.plane_bytes = max(1, packed.slots) * layout.edge_planes(precision.real).itemsize
         self.shared_lights = shares_lights(packed.scene, precision, device, packed.slots)
+        self.shared_suns = shares_suns(packed.scene, precision, device, packed.slots)
         self._check_memory()
         self.frame = self.upload(packed.frame)
         self.vertices = self.upload(packed.vertices)
@@ -105,7 +119,7 @@ class Buffers:
         if name == "light_planes":
             record, origins = layout.edge_planes(real), len(scene.lights_with_position) if self.shared_lights else 0
         else:
-            record, origins = layout.parallel_planes(real), len(scene.suns) if program.suns_share(self.features, self.shared_lights) else 0
+            record, origins = layout.parallel_planes(real), len(scene.suns) if program.suns_share(self.features, self.shared_suns) else 0
         return self.empty(record.itemsize * max(1, self.packed.slots * origins))
 
     def _boxes(self) -> tuple[list[int], dict[str, Any]]:
