@@ -2,7 +2,7 @@
 //           what is inlined into it three times: so its parts are not.
 // Needs: lanes.cl, structs, triangle.cl.  Reads: nothing.
 //
-// All in float64, rounded once to `real`; the bounds are derived in triangle.cl, those along suns in sun_visible.cl.
+// All in float64, rounded once to `real`; the bounds are derived in triangle.cl, and where effects add others.
 static inline double length_double(const double *a) { return sqrt(dot_double(a, a)); }
 
 // 8u |n|, and the float64 error of n = e1 x e2 itself, which is below 4 * 2^-53 |e1||e2| and counts for needles.
@@ -33,6 +33,7 @@ static __attribute__((noinline)) void prepare_triangle(global const double *vert
     }
     triangles[slot].bound = (real)(64 * UNIT_ROUNDOFF * fmax(length_double(e1), length_double(e2)));
     triangles[slot].normal_bound = (real)(scale * normal_bound(e1, e2, normal));
+    //@ prepare_triangle
 }
 
 static __attribute__((noinline)) void prepare_planes(global const double *vertices, int slot, const double *origin, global EdgePlanes *planes) {

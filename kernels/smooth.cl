@@ -1,7 +1,7 @@
 // Provides: smooth_normals: the shading normal interpolated between the corners of a triangle; smooth_lift: where rays from a light end.
 // Needs: hit.cl, geometry.cl.  Reads: nothing.
 
-// Barycentric weights are ratios of areas seen along the normal, n.(e x (p - v0)) / n.n; weights outside [0, 1] by rounding are clamped.
+// Barycentric weights are ratios of areas seen along the normal, n.(e x (p - v0)) / n.(e1 x e2); weights outside [0, 1] by rounding are clamped.
 // A triangle is curved unless all corners have the face's own normal, to the bit.
 HOT void smooth_normals(const Geometry *geometry, Hit *hit) {
     real p[3][LANES], smooth[3][LANES], weight[2][LANES];
@@ -19,15 +19,14 @@ HOT void smooth_normals(const Geometry *geometry, Hit *hit) {
             if (corner[i] != smooth[i % 3][k]) curved[k] = -1;
         real at[3];
         for (int a = 0; a < 3; a++) at[a] = p[a][k] - t->v0[a];
-        real u = 0, v = 0, area = 0;
+        real u = 0, v = 0;
         for (int a = 0; a < 3; a++) {
             const int b = (a + 1) % 3, c = (a + 2) % 3;
             u += t->normal[a] * (at[b] * t->e2[c] - at[c] * t->e2[b]);
             v += t->normal[a] * (t->e1[b] * at[c] - t->e1[c] * at[b]);
-            area += t->normal[a] * t->normal[a];
         }
-        weight[0][k] = u = clamp(u / area, R(0.0), R(1.0));
-        weight[1][k] = v = clamp(v / area, R(0.0), R(1.0) - u);
+        weight[0][k] = u = clamp(u / t->area, R(0.0), R(1.0));
+        weight[1][k] = v = clamp(v / t->area, R(0.0), R(1.0) - u);
         for (int a = 0; a < 3; a++) smooth[a][k] = (R(1.0) - u - v) * corner[a] + u * corner[3 + a] + v * corner[6 + a];
     }
     hit->weight[1] = load_lanes(weight[0]);
@@ -74,6 +73,9 @@ HOT void smooth_lift(const Geometry *geometry, Hit *hit) {
     for (int a = 0; a < 3; a++) hit->lift[a] = choose(hit->curved, hit->lift[a] - sunk * hit->geometric[a], (real_n)0);
 }
 
+//@hook prepare_triangle
+    triangles[slot].area = (real)(scale * dot_double(normal, normal));
+//@end
 //@hook geometry_members
     global const real *corner_normals;   // 9 a slot
 //@end

@@ -33,10 +33,12 @@ def c_struct(name: str, dtype: np.dtype[np.void]) -> str:
 
 
 def triangle(real: type) -> np.dtype[np.void]:
-    """A triangle for rays of any origin: relative to the local origin, with the bounds of triangle.cl. 64 bytes in float32."""
+    """A triangle for rays of any origin: relative to the local origin, with the bounds of triangle.cl. Its normal is scaled by a power of
+    two; `area` is what smooth.cl divides by. 64 bytes in float32.
+    """
     vector: Any = (real, (3,))
     return struct_dtype([("v0", *vector), ("e1", *vector), ("e2", *vector), ("normal", *vector), ("bound", real), ("normal_bound", real),
-                         ("unused", real, (2,))])  # fmt: skip
+                         ("area", real), ("unused", real)])  # fmt: skip
 
 
 def edge_planes(real: type) -> np.dtype[np.void]:

@@ -46,8 +46,7 @@ class PartedTree:
 
 
 def part(tree: JoinedTrees, counts: Ints, points: FloatArray, size: int) -> tuple[PartedTree, Ints]:
-    """The trees of `points` (n, 3), the middles of triangles, `counts` of each tree, with at most `size` in a leaf; and their order (n,).
-    """
+    """The trees of `points` (n, 3), middles of triangles, `counts` of each tree, with at most `size` in a leaf; and their order (n,)."""
     axis, child = tree.split_axis.astype(np.int64), tree.child.astype(np.int64)
     levels: list[Ints] = []
     level: Ints = tree.roots[axis[tree.roots] != LEAF]
