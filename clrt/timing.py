@@ -39,9 +39,12 @@ def interleave(
     rounds: int,
     *,
     warm_ups: int = 1,
+    before: int = 0,
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, Series]:
     """Run A B C A B C ...: `warm_ups` rounds that are not kept, then `rounds` that are; a contender may return `Told` seconds.
+
+    before : runs of a contender in its turn that are not timed: after them it finds its own data in the caches, not what the others left
 
     Raises ValueError for no rounds.
     """
@@ -50,6 +53,8 @@ def interleave(
     taken: dict[str, list[float]] = {name: [] for name in contenders}
     for turn in range(warm_ups + rounds):
         for name, run in contenders.items():
+            for _ in range(before):
+                run()
             start = clock()
             told = run()
             seconds = float(told) if isinstance(told, Told) else clock() - start

@@ -54,6 +54,20 @@ def test_no_rounds_are_refused() -> None:
         interleave({"A": lambda: None}, 0)
 
 
+def test_runs_before_a_turn_are_not_timed() -> None:
+    now = [0.0]
+    ran: list[str] = []
+
+    def run(name: str, cold: float, warm: float) -> None:
+        now[0] += warm if ran and ran[-1] == name else cold
+        ran.append(name)
+
+    turns = {"A": lambda: run("A", 9.0, 2.0), "B": lambda: run("B", 8.0, 3.0)}
+    taken = interleave(turns, 2, before=1, clock=lambda: now[0])
+    assert ran == ["A", "A", "B", "B"] * 3
+    assert (taken["A"].seconds, taken["B"].seconds) == ((2.0, 2.0), (3.0, 3.0))
+
+
 def test_time_of_a_whole_picture_from_a_sample_leaves_the_launch_out() -> None:
     # 100 rays in 3 s of which 1 s is the launch: 0.02 s a ray
     assert whole_from_sample(3.0, 1.0, 100, 1000) == pytest.approx(1.0 + 1000 * 0.02)

@@ -102,7 +102,7 @@ def _one_size(scene: Scene, rounds: int, device: Device, peers: Peers, embreex: 
         turns.contenders |= {f"{EMBREEX}, {kind}": partial(embreex.trace, kind) for kind in ("primary", "shadow")}
         turns.rays[EMBREEX] = {"primary": len(primary), "shadow": len(shadow)}
         row["pixels_that_differ"] = _differences(*_found(embreex, primary, pixels), tracers[DEFAULT])
-    series = interleave(turns.contenders, rounds)
+    series = interleave(turns.contenders, rounds, before=1)
     turns.cpu |= {name: cores_used(turns.contenders[name]) for name in turns.contenders if name.startswith((f"clrt {DEFAULT}", EMBREEX))}
     turns.cpu |= {worker.name: statistics.median(worker.cpu) for worker in peers.workers}
     row |= {"rays": turns.rays, "counts": turns.counts, "cores_used": turns.cpu}
@@ -204,7 +204,7 @@ def _general(scene: Scene, rounds: int, device: Device, peers: Peers, embreex: E
     if embreex is not None:
         embreex.load("general", rays)
         contenders[EMBREEX] = partial(embreex.trace, "general")
-    series = interleave(contenders, rounds)
+    series = interleave(contenders, rounds, before=1)
     hit = float(np.mean(caster.first_hit(rays.origins, rays.directions)["prim_id"] >= 0))
     seconds = {name: times.to_json() for name, times in series.items()}
     return {"size": size, "rays": len(rays), "hit_share": hit, "seconds": seconds} | compared_general(series, len(rays))
