@@ -58,7 +58,7 @@ static __attribute__((noinline)) void prepare_planes(global const double *vertic
     const double offset_error = 16 * 0x1p-53 * length_double(corner[0]) * length_double(e1) * length_double(e2), scale = power_below(size);
     for (int a = 0; a < 3; a++) planes->normal[a] = (real)(scale * normal[a]);
     planes->offset = (real)(scale * offset);
-    planes->bound = (real)(3 * UNIT_ROUNDOFF * steepest + 16 * 0x1p-53 * longest);
+    planes->bound = (real)(3 * UNIT_ROUNDOFF * steepest + 16 * 0x1p-53 * longest + UNDERFLOWN);
     planes->normal_bound = (real)(scale * bound);
     planes->t_bound = (real)((2 + 0x1p-18) * ((scale * fabs(offset)) * (scale * bound) + (scale * size) * (scale * offset_error)) + 0x1p-120);
 }

@@ -6,11 +6,11 @@
 // |--------------------|-------------------------------------------------------|----------------------------|----------------|
 // | sampler_sobol      | Sobol's first two dimensions: a (0, 2)-sequence        | Joe and Kuo 2008           | none           |
 // | sampler_permute    | a nested permutation of bits, from the lowest up      | Laine and Karras 2011;     | none           |
-// |--------------------|                                                       | Burley 2020, listing 1     |                |
+// |                    |                                                       | Burley 2020, listing 1     |                |
 // | sampler_words      | Owen-scrambled Sobol, padded: each pair of dimensions | Owen 1995; Burley 2020,    | none           |
-// |--------------------| shuffled and scrambled by itself                      | section 5                  |                |
+// |                    | shuffled and scrambled by itself                      | section 5                  |                |
 // | uniform_from_words | the upper 24 bits (float64: all 32) times 2^-24 (-32) | Vigna 2014, "[0, 1) from   | none: each     |
-// |--------------------|                                                       | upper bits"; Goualard 2020 | step is exact  |
+// |                    |                                                       | upper bits"; Goualard 2020 | step is exact  |
 //
 // Dimensions: 0 and 1 the place in the pixel, 2 and 3 the place on the lens. clrt/reference/sampler.py gives the same words.
 

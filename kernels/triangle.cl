@@ -5,8 +5,8 @@
 // computed from the given numbers in float64 and rounded once (prepare.cl): a test is three dot products.
 // What counts is how large a result r of the wrong sign can be. With P_i the products and S = |P_1| + |P_2| + |P_3| <= |d||N|, in
 // r = fl(q + P_3), q = fl(P_1 + P_2), fused or not, it is off by at most uS (N rounded) + uS (products) + u|q| + u|r|. Of the wrong sign, |r| is
-// itself below that, so q is -P_3 but for O(u): |q| <= S/2 + O(u) S. Together below 2.5u (1 + 16u) |N| for |d| <= 1 + 4u: `bound` = 3u max|N|, to which the
-// float64 error of N itself, 16 * 2^-53 max|b||c|, is added. Beyond it the sign of r is right.
+// itself below that, so q is -P_3 but for O(u): |q| <= S/2 + O(u) S. Together below 2.5u (1 + 16u) |N| for |d| <= 1 + 5u: `bound` = 3u max|N|, to which the
+// float64 error of N itself, 16 * 2^-53 max|b||c|, is added, and UNDERFLOWN for what is too small for `real`. Beyond it the sign of r is right.
 // Other rays use Moeller and Trumbore (1997) on v0, e1, e2, rounded from the given numbers relative to the local origin. With
 // reach >= |o - v0| + |e| and m = max(|e1|, |e2|), each of u, v, w is a triple product of such lengths: 9 roundings of terms
 // below reach m |d| for T.(d x e2), a shift of 2u reach m for the rounded origin, corner and edges, three of those in w = det - u - v:

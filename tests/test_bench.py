@@ -254,7 +254,7 @@ def test_a_busy_machine_is_told() -> None:
     results = bench_results.results()
     assert not list(report.warnings(results))
     results["versus"]["views"][1]["cores_used"]["embreex, primary"] = 1.2
-    assert ["Something else used the cores" in text for text in report.warnings(results)] == [True]
+    assert ["less than nine tenths of the cores" in text for text in report.warnings(results)] == [True]
 
 
 def test_ranges_are_not_called_intervals() -> None:

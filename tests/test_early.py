@@ -63,7 +63,10 @@ def test_library_is_read_once_and_first(tmp_path: Path) -> None:
 def test_nothing_is_begun_where_a_program_is_compiled_already(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(kernel_cache.VARIABLE, str(tmp_path))
     monkeypatch.setattr(early, "_read_library", lambda *_: pytest.fail("something was begun"))
-    (tmp_path / "AB").mkdir()
+    (tmp_path / "AB" / "CDE").mkdir(parents=True)  # what a build that failed leaves
+    assert kernel_cache.is_new(tmp_path)
+    (tmp_path / "AB" / "CDE" / "program.bc").touch()
+    kernel_cache.was_new.cache_clear()
     assert early.begin() == {}
 
 

@@ -81,6 +81,21 @@ def test_exact_picture_shows_the_triangle_of_rational_arithmetic(device: Device,
     assert np.array_equal(seen, expected)
 
 
+@pytest.mark.parametrize("size", [1e-20, 1e-21, 1e-22])
+def test_exact_picture_of_what_is_tiny_in_a_large_scene(device: Device, size: float) -> None:
+    """Seen from as near: products of its numbers have no room in float32. A triangle far greater stands behind it."""
+    vertices, faces = uv_sphere(900)
+    behind = np.array([[-3.0, -3.0, 3.0], [3.0, -3.0, 3.0], [0.0, 6.0, 3.0]])
+    faces = np.concatenate([faces, len(vertices) + np.arange(3)[None]])
+    vertices = np.concatenate([vertices * size, behind])
+    eye = np.array([0.3, 0.4, -2.5]) * size
+    scene = _scene(vertices, faces, eye, np.zeros(3), 48, 50.0)
+    seen, directions = _visible(scene, device, "exact")
+    expected, _ = exact.first_hit(scene.objects[0].vertices, np.broadcast_to(eye, directions.shape), directions)
+    assert (expected < 900).sum() > 200
+    assert np.array_equal(seen, expected)
+
+
 def test_exact_picture_through_vertices_and_edges(device: Device) -> None:
     """A grid in front of the eye whose every vertex lies on a pixel's ray: all decisions are ties, which `fast` gets wrong."""
     n = 16

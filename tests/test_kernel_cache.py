@@ -199,3 +199,13 @@ def test_mark_goes_with_a_process_that_ctrl_c_ends(tmp_path: Path, end: str) -> 
 def _load_nothing() -> None:
     with kernel_cache.loading():
         pass
+
+
+def test_cache_folder_that_is_a_file_is_named_in_the_error(tmp_path: Path) -> None:
+    (tmp_path / "scene.txt").write_text("E 0 0 -3\nV 0 0 1\nF 40\nR 8 8\nM 1 1 1 0.1 0.9 0.3 20 0\nT -1 -1 0 1 -1 0 0 1 0\n")
+    (tmp_path / "file").touch()
+    given = {**os.environ, "POCL_CACHE_DIR": str(tmp_path / "file")}
+    told = subprocess.run([sys.executable, "-m", "clrt", "scene.txt"], cwd=tmp_path, env=given, capture_output=True, text=True, check=False)
+    assert told.returncode == 2
+    assert "cannot write to POCL_CACHE_DIR=" in told.stderr
+    assert not (tmp_path / "scene.png").exists()

@@ -64,7 +64,10 @@ def warnings(results: dict[str, Any]) -> Iterator[str]:
         # trimesh works on one core, whatever there is.
         if min((value for name, value in used.items() if name != "trimesh"), default=cores) < _BUSY * cores:
             load = results["load_before"][0]
-            yield f"Something else used the cores meanwhile (load {load} before): ratios hold better than times; run again when idle."
+            yield (
+                f"Some tracers got less than nine tenths of the cores (load {load} before): ratios hold better than times; "
+                "run again when idle."
+            )
     if (rounds := fewest_rounds(results)) < FEWEST:
         yield f"Of {rounds} rounds no interval can be had: brackets hold the range of the ratios. Give --rounds {FEWEST} or more."
     if made := [scene["name"] for scene in results["scenes"] if scene["generated"]]:

@@ -86,7 +86,7 @@ def general_table(general: dict[str, Any]) -> Table:
     note = (
         f"The same view through a lens, {general['size']} squared: {general['rays']:,} rays, of which each begins elsewhere and neighbours "
         "have nearly the same direction. A picture of clrt draws them, traces them in packets for any origin and shades their hits; "
-        "drawing points of the lens takes much of its time, so `clrt` is the picture less one of nothing: tracing and shading. "
+        "drawing points of the lens takes part of its time, so `clrt` is the picture less one of nothing: tracing and shading. "
         "Embree C++ likewise is without the reading of its rays. The others are whole calls over arrays of the same rays; "
         "RayCaster.first_hit takes and gives NumPy arrays. The last column has `clrt` over each of the others."
     )

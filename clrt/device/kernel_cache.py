@@ -54,7 +54,8 @@ def choose_folder() -> Path:
 def is_new(folder: Path) -> bool:
     """Whether PoCL has compiled nothing into this folder yet."""
     try:
-        return not any(re.fullmatch("[A-P]{2}", name) for name in os.listdir(folder))
+        # A build that failed, as that which has PoCL read its library does, leaves a folder without a program.
+        return folder.is_dir() and not any(folder.glob("[A-P][A-P]/*/program.bc"))
     except OSError:
         return False
 
