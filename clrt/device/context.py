@@ -45,10 +45,8 @@ def lanes_of(native_float_width: int) -> int:
 
 
 def _none_found() -> str:
-    folder = kernel_cache.unwritable_folder()
-    if folder is None:
-        return INSTALL_HINT
-    return f"no OpenCL device found: PoCL cannot write to {kernel_cache.VARIABLE}={folder}; name another folder there, or unset it"
+    wrong = kernel_cache.unwritable_folder()
+    return INSTALL_HINT if wrong is None else f"no OpenCL device found: {wrong}"
 
 
 def _handles() -> list[Any]:

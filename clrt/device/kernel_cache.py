@@ -103,9 +103,11 @@ def _home() -> Path:
 
 
 def unwritable_folder() -> str | None:
-    """The value of POCL_CACHE_DIR where PoCL cannot write there, and so has no device."""
+    """What is wrong where PoCL cannot write to POCL_CACHE_DIR, and so has no device, or compiles nothing."""
     folder = os.environ.get(VARIABLE)
-    return folder if folder and not _writable(Path(folder)) else None
+    if not folder or _writable(Path(folder)):
+        return None
+    return f"PoCL cannot write to {VARIABLE}={folder}; name another folder there, or unset it"
 
 
 def _temporary_home() -> Path:

@@ -360,6 +360,6 @@ def build(device: Device, source: str, options: tuple[str, ...] = OPTIONS) -> An
             error = failure
             if not (more and lean.lacks(failure)):
                 kernel_cache.suspect()
-    if (folder := kernel_cache.unwritable_folder()) is not None:
-        raise DeviceError(f"PoCL cannot write to {kernel_cache.VARIABLE}={folder}; name another folder there, or unset it") from error
+    if wrong := kernel_cache.unwritable_folder():
+        raise DeviceError(wrong) from error
     raise DeviceError(f"the device '{device.info.name}' could not compile the program: {error}") from error

@@ -42,23 +42,26 @@ def check_picture(device: Device, width: int, height: int) -> None:
 
 def shares_lights(scene: Scene, precision: Precision, device: Device, slots: int | None = None) -> bool:
     """Whether edge planes of every light, of so many slots (default: of all triangles), fit in the device's memory."""
-    return _have_room(device, _of_lights(scene, precision, slots), 0)
+    return _have_room(device, _of_lights(scene, precision, slots))
 
 
 def shares_suns(scene: Scene, precision: Precision, device: Device, slots: int | None = None) -> bool:
     """Whether those along every sun fit beside them."""
-    count = scene.triangle_count if slots is None else slots
-    size = max(1, count) * layout.parallel_planes(precision.real).itemsize * len(scene.suns)
+    size = _plane_bytes(layout.parallel_planes(precision.real), len(scene.suns), scene, slots)
     return _have_room(device, size, _of_lights(scene, precision, slots) if shares_lights(scene, precision, device, slots) else 0)
 
 
 def _of_lights(scene: Scene, precision: Precision, slots: int | None) -> int:
     """Bytes of the planes of every light."""
-    count = scene.triangle_count if slots is None else slots
-    return max(1, count) * layout.edge_planes(precision.real).itemsize * len(scene.lights_with_position)
+    return _plane_bytes(layout.edge_planes(precision.real), len(scene.lights_with_position), scene, slots)
 
 
-def _have_room(device: Device, size: int, beside: int) -> bool:
+def _plane_bytes(record: np.dtype[np.void], origins: int, scene: Scene, slots: int | None) -> int:
+    return max(1, scene.triangle_count if slots is None else slots) * record.itemsize * origins
+
+
+def _have_room(device: Device, size: int, beside: int = 0) -> bool:
+    """Whether the device gives `size` bytes in one piece, and has a quarter of its memory for those and `beside`."""
     return bool(size <= device.handle.max_mem_alloc_size and size + beside <= device.handle.global_mem_size // 4)
 
 
@@ -132,8 +135,8 @@ class Buffers:
             origins["suns"] = min(len(scene.suns), program.LIGHTS_SEEN)
         levels, record = self._box_levels(), layout.direction_boxes().itemsize
         size = (1 + sum(levels)) * record
-        room = self.device.handle
-        if size * max(origins.values()) > room.max_mem_alloc_size or size * sum(origins.values()) > room.global_mem_size // 4:
+        most = max(origins.values())
+        if not _have_room(self.device, size * most, size * (sum(origins.values()) - most)):
             levels, size = [], record
         return levels, {name: self.empty(size * n) for name, n in origins.items()}
 
